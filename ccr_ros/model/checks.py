@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Checks of numbers that come from outside: each returns the clean value or raises InvalidValue."""
+
+from __future__ import annotations
+
+import math
+from numbers import Integral, Real
+from typing import Any
+
+import numpy as np
+
+from .errors import InvalidValue
+
+
+def real(
+    place: str,
+    value: Any,
+    *,
+    above: float = -math.inf,
+    below: float = math.inf,
+    low: float = -math.inf,
+    high: float = math.inf,
+    unit: str = "",
+) -> float:
+    """Return ``value`` as a finite float with above < value < below and low <= value <= high."""
+    limits = [
+        f"> {above:g}" if above > -math.inf else "",
+        f">= {low:g}" if low > -math.inf else "",
+        f"< {below:g}" if below < math.inf else "",
+        f"<= {high:g}" if high < math.inf else "",
+    ]
+    allowed = " and ".join(["a finite number" + (f" [{unit}]" if unit else "")] + [x for x in limits if x])
+    if isinstance(value, bool | np.bool_) or not isinstance(value, Real):
+        raise InvalidValue(place, value, allowed)
+    number = float(value)
+    if not (math.isfinite(number) and above < number < below and low <= number <= high):
+        raise InvalidValue(place, value, allowed)
+    return number
+
+
+def integer(place: str, value: Any, *, low: int, high: int | None = None) -> int:
+    """Return ``value`` as an int with low <= value (<= high)."""
+    allowed = f"an integer >= {low}" if high is None else f"an integer {low}..{high}"
+    if isinstance(value, bool | np.bool_) or not isinstance(value, Integral):
+        raise InvalidValue(place, value, allowed)
+    if value < low or (high is not None and value > high):
+        raise InvalidValue(place, value, allowed)
+    return int(value)
+
+
+def vector(place: str, value: Any, size: int, *, unit: str = "") -> np.ndarray:
+    """Return ``value`` as a read-only finite float vector of the given size."""
+    allowed = f"{size} finite numbers" + (f" [{unit}]" if unit else "")
+    if not isinstance(value, list | tuple | np.ndarray):
+        raise InvalidValue(place, value, allowed)
+    if len(value) != size:
+        raise InvalidValue(place, value, f"{allowed} (got {len(value)})")
+    array = np.array([real(f"{place}[{i}]", v, unit=unit) for i, v in enumerate(value)])
+    array.setflags(write=False)
+    return array
+
+
+def direction(place: str, value: Any) -> np.ndarray:
+    """Return ``value`` as a read-only unit 3-vector; it may not be (nearly) zero."""
+    array = vector(place, value, 3)
+    norm = float(np.linalg.norm(array))
+    if not 1e-9 < norm < math.inf:
+        raise InvalidValue(place, value, "a non-zero 3-vector")
+    unit = array / norm
+    unit.setflags(write=False)
+    return unit
+
+
+def name(place: str, value: Any) -> str:
+    """Return ``value`` as a name usable in a ROS topic: a letter, then letters, digits and ``_``."""
+    allowed = "a name of letters, digits and single '_' that starts with a letter"
+    if not isinstance(value, str) or not value.isascii() or not value.replace("_", "a").isalnum():
+        raise InvalidValue(place, value, allowed)
+    if not value[0].isalpha() or "__" in value:
+        raise InvalidValue(place, value, allowed)
+    return value
+
+
+def quaternion(place: str, value: Any) -> np.ndarray:
+    """Return ``value`` (x, y, z, w) as a read-only unit quaternion; within 1 % of unit length."""
+    array = vector(place, value, 4)
+    norm = float(np.linalg.norm(array))
+    if not abs(norm - 1.0) <= 0.01:
+        raise InvalidValue(place, value, f"a unit quaternion (x, y, z, w); its length is {norm:.6g}")
+    unit = array / norm
+    unit.setflags(write=False)
+    return unit

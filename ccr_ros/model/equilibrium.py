@@ -1,0 +1,267 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The equilibrium problem of a finger: least strain energy under cable lengths and obstacles.
+
+In units of the finger's length L and of EI / L for energy, with y the departure from the rest
+shape scaled so that the strain energy (the paper's Eq. 1-3) is 1/2 y.y:
+
+    min_y  1/2 y.y   subject to   length of cable c      <=  rest length - pull      (tension T_c)
+                                  -signed distance of k  <=  0                       (contact F_k)
+
+The Lagrange multipliers are the tensions and contact forces, times L^2 / EI. This module builds
+the problem and evaluates it with exact derivatives; `solver` solves it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .finger import Finger
+from .obstacles import Obstacle
+from .rod import Rod, RodState
+from .settings import SolverSettings
+
+
+@dataclass(frozen=True)
+class PointLabel:
+    """What a point of the finger is: disk index, kind of point, and the cable it belongs to."""
+
+    disk: int
+    point: str
+    cable: str
+
+
+class Points:
+    """The backbone, cable and antagonist points of a finger, each once.
+
+    Two cables in opposite holes share their points (one's antagonist is the other's cable point);
+    a point is listed once, lest the multipliers of its contact be ambiguous.
+
+    Attributes:
+        labels: One per point, ordered by disk.
+        disk: (P,) disk index.
+        offset: (P, 3) position in the disk's frame, in units of L.
+        backbone: (n+1,) indices of the disk centres.
+        cable, antagonist: Per cable, (k+1,) indices of its points.
+    """
+
+    def __init__(self, finger: Finger) -> None:
+        radius = finger.disk_radius / finger.length
+        self.labels: list[PointLabel] = []
+        offsets: list[np.ndarray] = []
+        backbone: list[int] = []
+        self.cable: list[list[int]] = [[] for _ in finger.cables]
+        self.antagonist: list[list[int]] = [[] for _ in finger.cables]
+        for disk in range(finger.segments + 1):
+            first = len(offsets)
+
+            def index(label: PointLabel, offset: np.ndarray, first: int = first) -> int:
+                for i in range(first, len(offsets)):
+                    if np.abs(offsets[i] - offset).max() < 1e-9:
+                        return i
+                self.labels.append(label)
+                offsets.append(offset)
+                return len(offsets) - 1
+
+            backbone.append(index(PointLabel(disk, "backbone", ""), np.zeros(3)))
+            for kind, sign, table in (("cable", 1, self.cable), ("antagonist", -1, self.antagonist)):
+                for j, cable in enumerate(finger.cables):
+                    if disk <= cable.last_disk:
+                        angle = cable.angles[disk]
+                        hole = sign * radius * np.array([np.cos(angle), np.sin(angle), 0.0])
+                        table[j].append(index(PointLabel(disk, kind, cable.name), hole))
+        self.disk = np.array([label.disk for label in self.labels])
+        self.offset = np.array(offsets)
+        self.backbone = np.array(backbone)
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """The problem at one y: the pose and the constraints' values (units of L).
+
+    Attributes:
+        y: (N,) scaled departure from the rest shape.
+        z: (E, .) arc coordinates.
+        rod: The rod's state.
+        points: (P, 3) all tracked points.
+        spans: (S, 3) unit vectors along the cables' spans.
+        span_lengths: (S,).
+        lengths: (C,) length of each cable (or of each span, in the proportional model).
+        distances: (O, P) signed distance of every point from every obstacle.
+    """
+
+    y: np.ndarray
+    z: np.ndarray
+    rod: RodState
+    points: np.ndarray
+    spans: np.ndarray
+    span_lengths: np.ndarray
+    lengths: np.ndarray
+    distances: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Linearization:
+    """First derivatives at an `Evaluation`.
+
+    Attributes:
+        points: (P, 3, N) Jacobian of all points.
+        spans: (S, 3, N) Jacobian of the span vectors.
+        lengths: (C, N) Jacobian of the cable lengths.
+    """
+
+    points: np.ndarray
+    spans: np.ndarray
+    lengths: np.ndarray
+
+
+class EquilibriumProblem:
+    """The optimisation problem of one finger, built once and evaluated often."""
+
+    def __init__(self, finger: Finger, settings: SolverSettings | None = None) -> None:
+        self.finger = finger
+        self.settings = settings or SolverSettings()
+        k, order = self.settings.arcs_per_segment, self.settings.curvature_order
+        self.arcs = finger.segments * k
+        self.rod = Rod(self.arcs, order)
+        h = 1.0 / self.arcs
+        stiffness = np.array([1.0, 1.0, finger.torsion_ratio])
+        # 1/2 h k (a - rest)^2 + 1/2 (h k / 3) b^2: Legendre polynomials are orthogonal.
+        per_arc = np.concatenate([stiffness, stiffness / 3][: order + 1])
+        rest = np.zeros((self.arcs, self.rod.size))
+        assert finger.rest_curvature is not None
+        rest[:, :3] = np.repeat(finger.rest_curvature * finger.length * h, k, axis=0)
+        self._z_rest = rest
+        self.coordinate_scale = np.sqrt(h / per_arc)  # z = rest + scale * y
+        self.rod_step = h
+        self.size = rest.size
+
+        self.points = Points(finger)
+        spans = [
+            (j, pts[i], pts[i + 1]) for j, pts in enumerate(self.points.cable) for i in range(len(pts) - 1)
+        ]
+        self.span_cable = np.array([s[0] for s in spans])
+        self._span_start = np.array([s[1] for s in spans])
+        self._span_end = np.array([s[2] for s in spans])
+        groups = self.span_cable if self.settings.cable_model == "frictionless" else np.arange(len(spans))
+        self.group_cable = np.array([self.span_cable[groups == g][0] for g in range(groups.max() + 1)])
+        self._span_group = groups
+        self._gather = (groups[None, :] == np.arange(groups.max() + 1)[:, None]).astype(float)
+
+        self._point_arc = self.points.disk * k
+        coordinate_arc = np.repeat(np.arange(self.arcs), self.rod.size)
+        self._moves = (coordinate_arc[None, :] < self._point_arc[:, None]).astype(float)[:, None, :]
+        self.obstacles: tuple[Obstacle, ...] = finger.obstacles
+        self.rest = self.evaluate(np.zeros(self.size))
+        self.rest_lengths = np.bincount(
+            self.group_cable, self.rest.lengths, minlength=len(finger.cables)
+        )
+
+    # -- constraint bounds -----------------------------------------------------------------
+
+    def length_bounds(self, pulls: np.ndarray) -> np.ndarray:
+        """Upper bounds (C,) of the cable (or span) lengths, in units of L, for pulls (m,) [m]."""
+        share = self.rest.lengths / self.rest_lengths[self.group_cable]
+        return self.rest.lengths - share * (pulls / self.finger.length)[self.group_cable]
+
+    # -- evaluation ------------------------------------------------------------------------
+
+    def evaluate(self, y: np.ndarray) -> Evaluation:
+        """Evaluate pose and constraints at y (N,)."""
+        z = self._z_rest + self.coordinate_scale * y.reshape(self.arcs, -1)
+        rod = self.rod.state(z)
+        frames, centres = rod.rotations[self._point_arc], rod.positions[self._point_arc]
+        points = centres + (frames @ self.points.offset[:, :, None])[:, :, 0]
+        vectors = points[self._span_end] - points[self._span_start]
+        span_lengths = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))
+        spans = vectors / np.maximum(span_lengths, 1e-12)[:, None]
+        metres = points * self.finger.length
+        distances = np.empty((len(self.obstacles), len(points)))
+        for i, obstacle in enumerate(self.obstacles):
+            distances[i] = obstacle.signed_distance(metres)
+        distances /= self.finger.length
+        return Evaluation(
+            y, z, rod, points, spans, span_lengths, self._gather @ span_lengths, distances
+        )
+
+    def linearize(self, at: Evaluation) -> Linearization:
+        """First derivatives at an evaluation."""
+        twists, scale = at.rod.twists, np.tile(self.coordinate_scale, self.arcs)
+        omega, velocity = (twists[:, :3] * scale[:, None]).T, (twists[:, 3:] * scale[:, None]).T
+        x = at.points
+        jacobian = np.empty((len(x), 3, self.size))
+        # dx = velocity + omega x x, row by row
+        jacobian[:, 0] = velocity[0] + omega[1] * x[:, 2:3] - omega[2] * x[:, 1:2]
+        jacobian[:, 1] = velocity[1] + omega[2] * x[:, 0:1] - omega[0] * x[:, 2:3]
+        jacobian[:, 2] = velocity[2] + omega[0] * x[:, 1:2] - omega[1] * x[:, 0:1]
+        jacobian *= self._moves
+        spans = jacobian[self._span_end] - jacobian[self._span_start]
+        lengths = self._gather @ (at.spans[:, None, :] @ spans)[:, 0, :]
+        return Linearization(jacobian, spans, lengths)
+
+    def contact_rows(
+        self, at: Evaluation, first: Linearization, pairs: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Gradients (c, N) of -distance at (obstacle, point) pairs (c, 2), normals and Hessians."""
+        normals, hessians = np.empty((len(pairs), 3)), np.empty((len(pairs), 3, 3))
+        for i, obstacle in enumerate(self.obstacles):
+            of = pairs[:, 0] == i
+            if of.any():
+                where = at.points[pairs[of, 1]] * self.finger.length
+                normals[of], hessians[of] = obstacle.derivatives(where)
+        hessians *= self.finger.length
+        rows = -(normals[:, None, :] @ first.points[pairs[:, 1]])[:, 0, :]
+        return rows, normals, hessians
+
+    def hessian(
+        self,
+        at: Evaluation,
+        first: Linearization,
+        tensions: np.ndarray,
+        pairs: np.ndarray,
+        normals: np.ndarray,
+        curvatures: np.ndarray,
+        forces: np.ndarray,
+    ) -> np.ndarray:
+        """Hessian (N, N) of the Lagrangian, for tensions (C,) and contact forces (c,) on pairs.
+
+        The second derivative of a sum of functions of points splits into the functions' own
+        curvature on the Jacobians and the points' curvature on the functions' gradients.
+        """
+        tension = tensions[self._span_group]
+        gradient = np.zeros_like(at.points)  # of the constraints' part of the Lagrangian
+        pull = tension[:, None] * at.spans
+        np.add.at(gradient, self._span_end, pull)
+        np.subtract.at(gradient, self._span_start, pull)
+
+        scale = np.sqrt(np.maximum(tension, 0.0) / np.maximum(at.span_lengths, 1e-12))
+        along = (at.spans[:, None, :] @ first.spans)  # (S, 1, N)
+        across = (first.spans - at.spans[:, :, None] * along) * scale[:, None, None]
+        across = across.reshape(-1, self.size)
+        hessian = across.T @ across
+
+        pressed = forces > 0
+        if pressed.any():
+            index, force = pairs[pressed, 1], forces[pressed]
+            np.subtract.at(gradient, index, force[:, None] * normals[pressed])
+            rows = first.points[index]
+            bent = (force[:, None, None] * curvatures[pressed]) @ rows
+            hessian -= rows.reshape(-1, self.size).T @ bent.reshape(-1, self.size)
+
+        total, moment = self._beyond(at.points, gradient)
+        scale_z = np.tile(self.coordinate_scale, self.arcs)
+        bending = self.rod.curvature_hessian(at.z, at.rod, total, moment)
+        hessian += bending * scale_z[:, None] * scale_z[None, :]
+        hessian.flat[:: self.size + 1] += 1.0  # the elastic energy, 1/2 y.y
+        return hessian
+
+    def _beyond(self, points: np.ndarray, gradient: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Sums of F and of F x^T over the points beyond the start of each arc."""
+        per_point = np.concatenate(
+            [gradient, (gradient[:, :, None] * points[:, None, :]).reshape(-1, 9)], axis=1
+        )
+        ends = np.zeros((self.arcs + 1, 12))
+        np.add.at(ends, self._point_arc, per_point)
+        sums = ends[::-1].cumsum(axis=0)[::-1][1:]
+        return sums[:, :3], sums[:, 3:].reshape(-1, 3, 3)

@@ -1,0 +1,207 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The description of a cable-driven continuum finger: geometry, material, routing, rest shape."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from . import checks
+from .errors import InvalidValue, UnknownName
+from .obstacles import Obstacle
+
+
+@dataclass(frozen=True, eq=False)
+class Cable:
+    """One cable and its routing.
+
+    Attributes:
+        name: Unique in its finger.
+        angles: (k+1,) hole angle [rad] at disks 0 (base) to k, about +z from +x of the disk;
+            the cable ends at disk k, which may lie before the tip.
+    """
+
+    name: str
+    angles: np.ndarray
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "name", checks.name("name", self.name))
+        count = len(self.angles) if isinstance(self.angles, list | tuple | np.ndarray) else 0
+        if count < 2:
+            raise InvalidValue("angles", self.angles, "a list of at least 2 hole angles [rad]")
+        object.__setattr__(self, "angles", checks.vector("angles", self.angles, count, unit="rad"))
+
+    @property
+    def last_disk(self) -> int:
+        """Index of the disk at which the cable ends."""
+        return len(self.angles) - 1
+
+    @classmethod
+    def from_holes(cls, name: str, holes: Sequence[int], holes_per_disk: int = 12) -> Cable:
+        """Make a cable from clock holes 1..holes_per_disk, hole k at angle 2 pi (k - 1) / holes_per_disk."""
+        if not isinstance(holes, list | tuple | np.ndarray):
+            raise InvalidValue("holes", holes, "a list of hole numbers, one per disk")
+        numbers = [
+            checks.integer(f"holes[{i}]", h, low=1, high=holes_per_disk) for i, h in enumerate(holes)
+        ]
+        return cls(name, np.array([2 * math.pi * (h - 1) / holes_per_disk for h in numbers]))
+
+
+@dataclass(frozen=True, eq=False)
+class Finger:
+    """A cable-driven continuum finger at rest, standing on its base disk: z along the backbone there.
+
+    Attributes:
+        name: Name of the finger.
+        length: Backbone length L0 [m].
+        segments: Number n of segments, each of length L0 / n; there are n + 1 disks.
+        disk_radius: Distance a of the cable holes from the backbone [m].
+        backbone_diameter: Of the circular backbone [m].
+        poisson_ratio: nu of the backbone; GJ / EI = 1 / (1 + nu).
+        cables: The cables, in the order in which pulls are given.
+        youngs_modulus: E [Pa], or ``None``: forces are then per EI.
+        rest_curvature: (n, 3) curvature [1/m] of each segment at rest, in the segment's own frame.
+        holes_per_disk: Number of clock holes on a disk.
+        obstacles: What the finger may touch, in the frame of its base.
+    """
+
+    name: str
+    length: float
+    segments: int
+    disk_radius: float
+    backbone_diameter: float
+    poisson_ratio: float
+    cables: tuple[Cable, ...]
+    youngs_modulus: float | None = None
+    rest_curvature: np.ndarray | None = None
+    holes_per_disk: int = 12
+    obstacles: tuple[Obstacle, ...] = ()
+
+    def __post_init__(self) -> None:
+        def put(key: str, value: Any) -> None:
+            object.__setattr__(self, key, value)
+
+        put("name", checks.name("name", self.name))
+        put("length", checks.real("length", self.length, above=0, unit="m"))
+        put("segments", checks.integer("segments", self.segments, low=2, high=1000))
+        put("disk_radius", checks.real("disk_radius", self.disk_radius, above=0, below=self.length, unit="m"))
+        put(
+            "backbone_diameter",
+            checks.real(
+                "backbone_diameter", self.backbone_diameter, above=0, below=2 * self.disk_radius, unit="m"
+            ),
+        )
+        put("poisson_ratio", checks.real("poisson_ratio", self.poisson_ratio, above=-1, high=0.5))
+        if self.youngs_modulus is not None:
+            put("youngs_modulus", checks.real("youngs_modulus", self.youngs_modulus, above=0, unit="Pa"))
+        put("holes_per_disk", checks.integer("holes_per_disk", self.holes_per_disk, low=1, high=3600))
+        put("rest_curvature", self._checked_rest_curvature())
+        put("cables", self._checked_cables())
+        put("obstacles", tuple(self.obstacles))
+
+    def _checked_rest_curvature(self) -> np.ndarray:
+        n, value = self.segments, self.rest_curvature
+        if value is None:
+            rest = np.zeros((n, 3))
+        else:
+            allowed = f"{n} vectors of 3 numbers [1/m], one per segment"
+            if not isinstance(value, list | tuple | np.ndarray):
+                raise InvalidValue("rest_curvature", value, allowed)
+            if len(value) != n:
+                raise InvalidValue("rest_curvature", value, f"{allowed} (got {len(value)})")
+            rest = np.array(
+                [checks.vector(f"rest_curvature[{i}]", v, 3, unit="1/m") for i, v in enumerate(value)]
+            )
+        # A segment bent further than half a turn, or so tightly that the inner side of a disk
+        # folds onto the next, is no finger.
+        limit = min(1.0 / self.disk_radius, math.pi / self.segment_length)
+        for i, u in enumerate(rest):
+            bend = math.hypot(u[0], u[1])
+            if bend >= limit or abs(u[2]) >= math.pi / self.segment_length:
+                raise InvalidValue(
+                    f"rest_curvature[{i}]",
+                    [float(x) for x in u],
+                    f"bending < {limit:.6g} 1/m and twist < {math.pi / self.segment_length:.6g} 1/m"
+                    " (disks would meet, or a segment turn by more than half a turn)",
+                )
+        rest.setflags(write=False)
+        return rest
+
+    def _checked_cables(self) -> tuple[Cable, ...]:
+        cables = tuple(self.cables)
+        if not cables:
+            raise InvalidValue("cables", [], "a list of at least one cable")
+        seen: set[str] = set()
+        for j, cable in enumerate(cables):
+            if cable.last_disk > self.segments:
+                raise InvalidValue(
+                    f"cables[{j}]",
+                    len(cable.angles),
+                    f"at most {self.segments + 1} holes (one per disk, base to tip)",
+                )
+            if cable.name in seen:
+                raise InvalidValue(f"cables[{j}].name", cable.name, "unique in its finger")
+            seen.add(cable.name)
+        return cables
+
+    @property
+    def segment_length(self) -> float:
+        """Length l0 of a segment [m]."""
+        return self.length / self.segments
+
+    @property
+    def second_moment(self) -> float:
+        """Second moment of area I = pi d^4 / 64 of the backbone [m^4]."""
+        return math.pi * self.backbone_diameter**4 / 64
+
+    @property
+    def bending_stiffness(self) -> float:
+        """EI [N m^2]; 1 when no Young's modulus is given, so that forces come out per EI."""
+        return 1.0 if self.youngs_modulus is None else self.youngs_modulus * self.second_moment
+
+    @property
+    def torsion_ratio(self) -> float:
+        """GJ / EI = 1 / (1 + nu) of a circular section (Eq. 3's D)."""
+        return 1.0 / (1.0 + self.poisson_ratio)
+
+    @property
+    def forces_are(self) -> str:
+        """``"newton"`` or ``"per_EI"`` [1/m^2]."""
+        return "per_EI" if self.youngs_modulus is None else "newton"
+
+    @property
+    def cable_names(self) -> tuple[str, ...]:
+        """Names of the cables, in the order in which pulls are given."""
+        return tuple(c.name for c in self.cables)
+
+    def pulls_array(self, pulls: Mapping[str, float] | Sequence[float] | np.ndarray) -> np.ndarray:
+        """Return checked pulls (m,) [m] from a mapping by cable name (absent: 0) or a sequence.
+
+        Raises:
+            UnknownName: A name that is no cable of this finger.
+            InvalidValue: Wrong count, or a pull that is not finite or beyond the finger's length.
+        """
+        if isinstance(pulls, Mapping):
+            for key in pulls:
+                if key not in self.cable_names:
+                    raise UnknownName("cable", key, self.cable_names)
+            values: list[Any] = [pulls.get(c, 0.0) for c in self.cable_names]
+        else:
+            if not isinstance(pulls, list | tuple | np.ndarray) or np.ndim(pulls) != 1:
+                raise InvalidValue("pulls", pulls, f"{len(self.cables)} numbers [m], one per cable")
+            values = list(pulls)
+            if len(values) != len(self.cables):
+                raise InvalidValue(
+                    "pulls", values, f"{len(self.cables)} numbers [m], one per cable (got {len(values)})"
+                )
+        limit = self.length
+        return np.array(
+            [
+                checks.real(f"pulls.{c}", v, low=-limit, high=limit, unit="m")
+                for c, v in zip(self.cable_names, values, strict=True)
+            ]
+        )

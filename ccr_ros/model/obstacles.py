@@ -1,0 +1,189 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Obstacles as smooth signed distances, positive outside, with gradient and Hessian.
+
+The paper's Eq. 6 asks for a function f(x) >= 0 outside the obstacle. A signed distance is the
+one whose multiplier is the contact's normal force, because its gradient is the unit normal.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from . import checks
+from .rotation import Pose, matrix_from_quaternion, quaternion_from_matrix
+
+_TINY = 1e-12  # m; where a normal is undefined (a sphere's centre), any unit vector serves
+
+
+@dataclass(frozen=True, eq=False)
+class Obstacle(ABC):
+    """A rigid body that disks and cables may touch but not enter. Frames: that of the finger's base."""
+
+    name: str = field(default="obstacle", kw_only=True)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "name", str(self.name))
+
+    def _set(self, **values: Any) -> None:
+        for key, value in values.items():
+            object.__setattr__(self, key, value)
+
+    @abstractmethod
+    def signed_distance(self, points: np.ndarray) -> np.ndarray:
+        """Return the distance (P,) in metres of points (P, 3); positive outside."""
+
+    @abstractmethod
+    def derivatives(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return outward unit normals (P, 3) and Hessians (P, 3, 3) [1/m] at points (P, 3)."""
+
+    @abstractmethod
+    def moved(self, pose: Pose) -> Obstacle:
+        """Return the obstacle carried by a rigid motion, given as the pose of its frame."""
+
+
+def _radial(offset: np.ndarray, span: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Normal and Hessian of |offset|, offset (P, 3) living in the subspace projected on by span."""
+    r = np.maximum(np.linalg.norm(offset, axis=1), _TINY)
+    normal = offset / r[:, None]
+    hessian = (span - normal[:, :, None] * normal[:, None, :]) / r[:, None, None]
+    return normal, hessian
+
+
+@dataclass(frozen=True, eq=False)
+class Sphere(Obstacle):
+    """A ball: center (3,) and radius, metres."""
+
+    center: np.ndarray
+    radius: float
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._set(
+            center=checks.vector("center", self.center, 3, unit="m"),
+            radius=checks.real("radius", self.radius, above=0, unit="m"),
+        )
+
+    def signed_distance(self, points: np.ndarray) -> np.ndarray:
+        return np.linalg.norm(points - self.center, axis=1) - self.radius
+
+    def derivatives(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return _radial(points - self.center, np.eye(3))
+
+    def moved(self, pose: Pose) -> Sphere:
+        return replace(self, center=pose.points(self.center))
+
+
+@dataclass(frozen=True, eq=False)
+class Cylinder(Obstacle):
+    """An infinite cylinder: a point on its axis (3,), the axis direction (3,), and the radius."""
+
+    point: np.ndarray
+    axis: np.ndarray
+    radius: float
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._set(
+            point=checks.vector("point", self.point, 3, unit="m"),
+            axis=checks.direction("axis", self.axis),
+            radius=checks.real("radius", self.radius, above=0, unit="m"),
+        )
+
+    def _across(self) -> np.ndarray:
+        return np.eye(3) - np.outer(self.axis, self.axis)
+
+    def signed_distance(self, points: np.ndarray) -> np.ndarray:
+        return np.linalg.norm((points - self.point) @ self._across(), axis=1) - self.radius
+
+    def derivatives(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        across = self._across()
+        return _radial((points - self.point) @ across, across)
+
+    def moved(self, pose: Pose) -> Cylinder:
+        return replace(self, point=pose.points(self.point), axis=pose.vectors(self.axis))
+
+
+@dataclass(frozen=True, eq=False)
+class Plane(Obstacle):
+    """A half-space: a point on its surface (3,) and the outward normal (3,)."""
+
+    point: np.ndarray
+    normal: np.ndarray
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._set(
+            point=checks.vector("point", self.point, 3, unit="m"),
+            normal=checks.direction("normal", self.normal),
+        )
+
+    def signed_distance(self, points: np.ndarray) -> np.ndarray:
+        return (points - self.point) @ self.normal
+
+    def derivatives(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return np.tile(self.normal, (len(points), 1)), np.zeros((len(points), 3, 3))
+
+    def moved(self, pose: Pose) -> Plane:
+        return replace(self, point=pose.points(self.point), normal=pose.vectors(self.normal))
+
+
+@dataclass(frozen=True, eq=False)
+class Box(Obstacle):
+    """A box with slightly rounded edges: center (3,), orientation (x, y, z, w), full size (3,).
+
+    The edges are rounded by ``edge_radius`` (default: 5 % of the shortest side, at most 1 mm), so
+    that the distance has a continuous normal at the surface; the faces stay where they are.
+    """
+
+    center: np.ndarray
+    size: np.ndarray
+    orientation: np.ndarray = field(default_factory=lambda: np.array([0.0, 0.0, 0.0, 1.0]))
+    edge_radius: float | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        size = checks.vector("size", self.size, 3, unit="m")
+        for i, side in enumerate(size):
+            checks.real(f"size[{i}]", float(side), above=0, unit="m")
+        shortest = float(size.min())
+        edge = min(0.05 * shortest, 0.001) if self.edge_radius is None else self.edge_radius
+        self._set(
+            center=checks.vector("center", self.center, 3, unit="m"),
+            size=size,
+            orientation=checks.quaternion("orientation", self.orientation),
+            edge_radius=checks.real("edge_radius", edge, above=0, high=shortest / 2, unit="m"),
+        )
+
+    def _local(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Rotation, points in the box's frame, and their excess over the core (the box less its rounding)."""
+        rotation = matrix_from_quaternion(self.orientation)
+        local = (points - self.center) @ rotation
+        return rotation, local, np.abs(local) - (self.size / 2 - self.edge_radius)
+
+    def signed_distance(self, points: np.ndarray) -> np.ndarray:
+        _, _, excess = self._local(points)
+        outside = np.linalg.norm(np.maximum(excess, 0.0), axis=1)
+        inside = np.minimum(excess.max(axis=1), 0.0)
+        return outside + inside - self.edge_radius
+
+    def derivatives(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        rotation, local, excess = self._local(points)
+        sign = np.where(local < 0, -1.0, 1.0)
+        clipped = np.maximum(excess, 0.0)
+        r = np.linalg.norm(clipped, axis=1)
+        deep = r < _TINY  # in the core: the nearest face decides
+        face = np.eye(3)[np.argmax(excess, axis=1)]
+        normal = np.where(deep[:, None], face, clipped / np.maximum(r, _TINY)[:, None])
+        active = (excess > 0).astype(float)
+        hessian = active[:, :, None] * np.eye(3) - normal[:, :, None] * normal[:, None, :]
+        hessian *= np.where(deep, 0.0, 1.0 / np.maximum(r, _TINY))[:, None, None]
+        hessian *= sign[:, :, None] * sign[:, None, :]
+        return (sign * normal) @ rotation.T, rotation @ hessian @ rotation.T
+
+    def moved(self, pose: Pose) -> Box:
+        turned = pose.rotation @ matrix_from_quaternion(self.orientation)
+        return replace(self, center=pose.points(self.center), orientation=quaternion_from_matrix(turned))

@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The QP of one SQP step, by its few multipliers.
+
+    min_d  1/2 d'Hd + g'd   subject to   A d <= r
+
+A finger has many coordinates and few constraints, so what is handed on is the Gram matrix
+S = A H^-1 A' and the residual t = r + A H^-1 g. If the constraints that were active still are, a
+linear solve gives the multipliers; else CasADi's DAQP (a dual active-set method) finds which are,
+as the least-distance problem   min 1/2 w'w  subject to  M w <= t,  M M' = S.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import casadi as ca
+import numpy as np
+
+
+def solve_multipliers(s: np.ndarray, t: np.ndarray, active: np.ndarray) -> np.ndarray | None:
+    """Return the multipliers m >= 0 with S m + t >= 0 and m'(S m + t) = 0, or None if infeasible.
+
+    Args:
+        s: (c, c) Gram matrix of the constraints, positive semidefinite.
+        t: (c,) their residuals at the unconstrained minimum; negative where violated.
+        active: (c,) bool, a guess at which multipliers are positive.
+    """
+    count = len(t)
+    if count == 0:
+        return np.zeros(0)
+    guess = _held(s, t, active)
+    if guess is not None:
+        return guess
+    unit = 1.0 / np.sqrt(np.maximum(np.diag(s), 1e-300))
+    # Twin or redundant points make S singular; the shift gives the least multipliers among equals.
+    scaled = s * unit[:, None] * unit[None, :] + 1e-11 * np.eye(count)
+    try:
+        factor = np.linalg.cholesky(scaled)
+    except np.linalg.LinAlgError:
+        return None
+    size = 1 << max(2, (count - 1).bit_length())
+    rows, upper = np.zeros((size, size)), np.full(size, np.inf)
+    rows[:count, :count], upper[:count] = factor, t * unit
+    solver = _daqp(size)
+    result = solver(h=np.eye(size), a=rows, uba=upper, lba=-np.inf, lbx=-np.inf, ubx=np.inf)
+    if not solver.stats()["success"]:
+        return None
+    found = np.maximum(np.asarray(result["lam_a"]).ravel()[:count] * unit, 0.0)
+    polished = _held(s, t, found > 0)
+    return found if polished is None else polished
+
+
+@lru_cache(maxsize=16)
+def _daqp(size: int) -> ca.Function:
+    dense = ca.Sparsity.dense(size, size)
+    options = {"error_on_fail": False}
+    return ca.conic(f"multipliers_{size}", "daqp", {"h": ca.Sparsity.diag(size), "a": dense}, options)
+
+
+def _held(s: np.ndarray, t: np.ndarray, active: np.ndarray) -> np.ndarray | None:
+    """The multipliers if exactly ``active`` are positive; None if that is not the solution."""
+    index = np.flatnonzero(active)
+    multipliers = np.zeros(len(t))
+    if len(index):
+        try:
+            multipliers[index] = np.linalg.solve(s[np.ix_(index, index)], -t[index])
+        except np.linalg.LinAlgError:
+            return None
+    slack = s @ multipliers + t
+    slack[index] = 0.0
+    tolerance = 1e-12 * max(1.0, float(np.abs(t).max()))
+    return multipliers if multipliers.min() >= 0 and slack.min() >= -tolerance else None

@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From a KKT point to a Solution: units, names, contacts and the certificate."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+
+from .equilibrium import EquilibriumProblem
+from .rod import centerline
+from .solution import Certificate, Contact, Solution
+from .sqp import KktPoint
+
+_CENTERLINE_POINTS = 8  # per segment
+
+
+class Walk(Protocol):
+    """What the certificate needs to know of the continuation."""
+
+    iterations: int
+    substeps: int
+    jumped: bool
+    start: object
+
+
+def smallest_reduced_eigenvalue(point: KktPoint) -> float:
+    """Smallest eigenvalue of the Hessian on the null space of the active constraints.
+
+    In the scaled coordinates, where the elastic energy is 1/2 y.y: relative to the free rod's own
+    stiffness.
+    """
+    rows = point.rows[point.active]
+    hessian = point.hessian
+    if len(rows):
+        q, _ = np.linalg.qr(rows.T, mode="complete")
+        null = q[:, len(rows) :]
+        hessian = null.T @ hessian @ null
+    return float(np.linalg.eigvalsh(hessian)[0]) if len(hessian) else 1.0
+
+
+def make_solution(
+    problem: EquilibriumProblem,
+    point: KktPoint,
+    pulls: np.ndarray,
+    walk: Walk,
+    reached: float | None,
+    elapsed: Callable[[], float],
+) -> Solution:
+    """Assemble the solution; ``reached`` is None, or the fraction of the way that converged."""
+    finger, at, length = problem.finger, point.at, problem.finger.length
+    force_unit = finger.bending_stiffness / length**2
+    disks = np.arange(finger.segments + 1) * problem.settings.arcs_per_segment
+    # The base end of a cable is where its tension is felt (all spans alike when frictionless).
+    base_group = np.array([np.flatnonzero(problem.group_cable == j)[0] for j in range(len(finger.cables))])
+    eigenvalue = smallest_reduced_eigenvalue(point)
+    z = at.z / problem.rod_step
+    arcs = (finger.segments, problem.settings.arcs_per_segment, problem.settings.curvature_order + 1, 3)
+    per_arc = -(-_CENTERLINE_POINTS // problem.settings.arcs_per_segment)
+    metres = at.points * length
+    names = finger.cable_names
+    cable_error, penetration = _errors(problem, point, pulls)
+    converged = point.converged and reached is None
+    stable = eigenvalue > 0.0
+    certificate = Certificate(
+        converged=converged,
+        stable=stable,
+        kkt=point.residual,
+        cable_error=cable_error,
+        penetration=penetration,
+        smallest_eigenvalue=eigenvalue,
+        iterations=walk.iterations,
+        solve_time=elapsed(),
+        branch_jump=walk.jumped,
+        substeps=walk.substeps,
+        message=_message(problem, pulls, walk, reached, stable),
+    )
+    return Solution(
+        finger=finger,
+        pulls=pulls,
+        backbone=metres[problem.points.backbone],
+        frames=at.rod.rotations[disks],
+        cables={n: metres[i] for n, i in zip(names, problem.points.cable, strict=True)},
+        antagonists={n: metres[i] for n, i in zip(names, problem.points.antagonist, strict=True)},
+        tensions=point.tensions[base_group] * force_unit,
+        contacts=_contacts(problem, point, force_unit),
+        energy=0.5 * float(at.y @ at.y) * finger.bending_stiffness / length,
+        curvature=z.reshape(arcs) / length,
+        centerline=centerline(at.rod, at.z, per_arc) * length,
+        certificate=certificate,
+    )
+
+
+def _errors(problem: EquilibriumProblem, point: KktPoint, pulls: np.ndarray) -> tuple[float, float]:
+    over = point.at.lengths - problem.length_bounds(pulls)
+    error = np.where(point.tensions > 0, np.abs(over), np.maximum(over, 0.0))
+    inside = np.maximum(-point.at.distances, 0.0)[:, problem.points.disk > 0]
+    length = problem.finger.length
+    return float(error.max(initial=0.0)) * length, float(inside.max(initial=0.0)) * length
+
+
+def _contacts(problem: EquilibriumProblem, point: KktPoint, unit: float) -> tuple[Contact, ...]:
+    count = len(point.tensions)
+    contacts = []
+    for k in np.flatnonzero(point.active[count:]):
+        obstacle, index = point.pairs[k]
+        label = problem.points.labels[index]
+        contacts.append(
+            Contact(
+                disk=label.disk,
+                point=label.point,
+                cable=label.cable,
+                obstacle=problem.obstacles[obstacle].name,
+                position=point.at.points[index] * problem.finger.length,
+                normal=point.normals[k],
+                force=float(point.multipliers[count + k]) * unit,
+            )
+        )
+    return tuple(sorted(contacts, key=lambda c: (c.disk, c.obstacle, c.point)))
+
+
+def _message(
+    problem: EquilibriumProblem, pulls: np.ndarray, walk: Walk, reached: float | None, stable: bool
+) -> str:
+    if reached is not None:
+        start = walk.start.pulls  # type: ignore[attr-defined]
+        shown = start + reached * (pulls - start)
+        where = ", ".join(f"{n}={p:.6g} m" for n, p in zip(problem.finger.cable_names, shown, strict=True))
+        return (
+            f"no equilibrium found beyond {reached:.1%} of the way to the wanted pulls; the pose shown"
+            f" is that of {where}. Pull less, or give the obstacles more room."
+        )
+    notes = []
+    if walk.jumped:
+        notes.append("the finger snapped through to another branch on the way")
+    if not stable:
+        notes.append("the pose is unstable: a saddle of the energy, which a disturbance leaves")
+    return "; ".join(notes)

@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Settings of the equilibrium problem and its solver."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from . import checks
+from .errors import InvalidValue
+
+
+@dataclass(frozen=True)
+class SolverSettings:
+    """How the equilibrium is discretised and solved.
+
+    Attributes:
+        arcs_per_segment: Number of arcs a segment is made of.
+        curvature_order: 1: curvature linear along each arc (default: one such arc per segment is
+            closer to the rod than eight of constant curvature); 0: constant-curvature arcs.
+        cable_model: ``"frictionless"``: a cable's total length is bounded, its tension uniform;
+            ``"proportional"``: each span's length is bounded, as in the paper's section 2.2.2.
+        max_pull_step: Largest pull change of one continuation step, as a fraction of the finger's
+            length.
+        max_iterations: Of one continuation step.
+        tolerance: Largest residual force relative to the elastic one, and largest constraint
+            violation relative to the finger's length.
+    """
+
+    arcs_per_segment: int = 1
+    curvature_order: int = 1
+    cable_model: str = "frictionless"
+    max_pull_step: float = 0.02
+    max_iterations: int = 40
+    tolerance: float = 1e-9
+
+    def __post_init__(self) -> None:
+        checks.integer("arcs_per_segment", self.arcs_per_segment, low=1, high=64)
+        checks.integer("curvature_order", self.curvature_order, low=0, high=1)
+        if self.cable_model not in ("frictionless", "proportional"):
+            raise InvalidValue("cable_model", self.cable_model, "'frictionless' or 'proportional'")
+        checks.real("max_pull_step", self.max_pull_step, above=0, high=1)
+        checks.integer("max_iterations", self.max_iterations, low=1)
+        checks.real("tolerance", self.tolerance, above=0, high=1e-3)
