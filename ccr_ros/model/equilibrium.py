@@ -147,11 +147,20 @@ class EquilibriumProblem:
         groups = self.span_cable if self.settings.cable_model == "frictionless" else np.arange(len(spans))
         self.group_cable = np.array([self.span_cable[groups == g][0] for g in range(groups.max() + 1)])
         self._span_group = groups
+        # +1 at a span's end, -1 at its start
+        self._incidence = np.zeros((len(spans), len(self.points.disk)))
+        self._incidence[np.arange(len(spans)), self._span_end] = 1.0
+        self._incidence[np.arange(len(spans)), self._span_start] = -1.0
         self._gather = (groups[None, :] == np.arange(groups.max() + 1)[:, None]).astype(float)
 
         self._point_arc = self.points.disk * k
         coordinate_arc = np.repeat(np.arange(self.arcs), self.rod.size)
         self._moves = (coordinate_arc[None, :] < self._point_arc[:, None]).astype(float)[:, None, :]
+        self._carried = (np.arange(self.arcs)[:, None] < self._point_arc[None, :]).astype(float)
+        self._scale = np.tile(self.coordinate_scale, self.arcs)
+        self.largest_scale = float(self._scale.max())
+        self.fixed = self.points.disk == 0  # points that do not move
+        self._scale_pairs = np.outer(self._scale, self._scale)
         self.obstacles: tuple[Obstacle, ...] = finger.obstacles
         self.rest = self.evaluate(np.zeros(self.size))
         self.rest_lengths = np.bincount(
@@ -187,14 +196,15 @@ class EquilibriumProblem:
 
     def linearize(self, at: Evaluation) -> Linearization:
         """First derivatives at an evaluation."""
-        twists, scale = at.rod.twists, np.tile(self.coordinate_scale, self.arcs)
-        omega, velocity = (twists[:, :3] * scale[:, None]).T, (twists[:, 3:] * scale[:, None]).T
+        # dx = velocity + omega x x: one product for all points and coordinates
         x = at.points
-        jacobian = np.empty((len(x), 3, self.size))
-        # dx = velocity + omega x x, row by row
-        jacobian[:, 0] = velocity[0] + omega[1] * x[:, 2:3] - omega[2] * x[:, 1:2]
-        jacobian[:, 1] = velocity[1] + omega[2] * x[:, 0:1] - omega[0] * x[:, 2:3]
-        jacobian[:, 2] = velocity[2] + omega[0] * x[:, 1:2] - omega[1] * x[:, 0:1]
+        lever = np.zeros((len(x), 3, 6))
+        lever[:, 0, 1], lever[:, 0, 2] = x[:, 2], -x[:, 1]
+        lever[:, 1, 0], lever[:, 1, 2] = -x[:, 2], x[:, 0]
+        lever[:, 2, 0], lever[:, 2, 1] = x[:, 1], -x[:, 0]
+        lever[:, 0, 3] = lever[:, 1, 4] = lever[:, 2, 5] = 1.0
+        scaled = at.rod.twists * self._scale[:, None]
+        jacobian = (lever.reshape(-1, 6) @ scaled.T).reshape(len(x), 3, self.size)
         jacobian *= self._moves
         spans = jacobian[self._span_end] - jacobian[self._span_start]
         lengths = self._gather @ (at.spans[:, None, :] @ spans)[:, 0, :]
@@ -230,10 +240,8 @@ class EquilibriumProblem:
         curvature on the Jacobians and the points' curvature on the functions' gradients.
         """
         tension = tensions[self._span_group]
-        gradient = np.zeros_like(at.points)  # of the constraints' part of the Lagrangian
-        pull = tension[:, None] * at.spans
-        np.add.at(gradient, self._span_end, pull)
-        np.subtract.at(gradient, self._span_start, pull)
+        # of the constraints' part of the Lagrangian, with respect to the points
+        gradient = self._incidence.T @ (tension[:, None] * at.spans)
 
         scale = np.sqrt(np.maximum(tension, 0.0) / np.maximum(at.span_lengths, 1e-12))
         along = (at.spans[:, None, :] @ first.spans)  # (S, 1, N)
@@ -250,18 +258,13 @@ class EquilibriumProblem:
             hessian -= rows.reshape(-1, self.size).T @ bent.reshape(-1, self.size)
 
         total, moment = self._beyond(at.points, gradient)
-        scale_z = np.tile(self.coordinate_scale, self.arcs)
         bending = self.rod.curvature_hessian(at.z, at.rod, total, moment)
-        hessian += bending * scale_z[:, None] * scale_z[None, :]
+        bending *= self._scale_pairs
+        hessian += bending
         hessian.flat[:: self.size + 1] += 1.0  # the elastic energy, 1/2 y.y
         return hessian
 
     def _beyond(self, points: np.ndarray, gradient: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Sums of F and of F x^T over the points beyond the start of each arc."""
-        per_point = np.concatenate(
-            [gradient, (gradient[:, :, None] * points[:, None, :]).reshape(-1, 9)], axis=1
-        )
-        ends = np.zeros((self.arcs + 1, 12))
-        np.add.at(ends, self._point_arc, per_point)
-        sums = ends[::-1].cumsum(axis=0)[::-1][1:]
-        return sums[:, :3], sums[:, 3:].reshape(-1, 3, 3)
+        moments = (gradient[:, :, None] * points[:, None, :]).reshape(-1, 9)
+        return self._carried @ gradient, (self._carried @ moments).reshape(-1, 3, 3)

@@ -9,11 +9,8 @@ from typing import Protocol
 import numpy as np
 
 from .equilibrium import EquilibriumProblem
-from .rod import centerline
 from .solution import Certificate, Contact, Solution
 from .sqp import KktPoint
-
-_CENTERLINE_POINTS = 8  # per segment
 
 
 class Walk(Protocol):
@@ -22,7 +19,7 @@ class Walk(Protocol):
     iterations: int
     substeps: int
     jumped: bool
-    start: object
+    start: np.ndarray
 
 
 def smallest_reduced_eigenvalue(point: KktPoint) -> float:
@@ -57,11 +54,10 @@ def make_solution(
     eigenvalue = smallest_reduced_eigenvalue(point)
     z = at.z / problem.rod_step
     arcs = (finger.segments, problem.settings.arcs_per_segment, problem.settings.curvature_order + 1, 3)
-    per_arc = -(-_CENTERLINE_POINTS // problem.settings.arcs_per_segment)
     metres = at.points * length
     names = finger.cable_names
     cable_error, penetration = _errors(problem, point, pulls)
-    converged = point.converged and reached is None
+    converged = reached is None
     stable = eigenvalue > 0.0
     certificate = Certificate(
         converged=converged,
@@ -87,7 +83,6 @@ def make_solution(
         contacts=_contacts(problem, point, force_unit),
         energy=0.5 * float(at.y @ at.y) * finger.bending_stiffness / length,
         curvature=z.reshape(arcs) / length,
-        centerline=centerline(at.rod, at.z, per_arc) * length,
         certificate=certificate,
     )
 
@@ -124,8 +119,7 @@ def _message(
     problem: EquilibriumProblem, pulls: np.ndarray, walk: Walk, reached: float | None, stable: bool
 ) -> str:
     if reached is not None:
-        start = walk.start.pulls  # type: ignore[attr-defined]
-        shown = start + reached * (pulls - start)
+        shown = walk.start + reached * (pulls - walk.start)
         where = ", ".join(f"{n}={p:.6g} m" for n, p in zip(problem.finger.cable_names, shown, strict=True))
         return (
             f"no equilibrium found beyond {reached:.1%} of the way to the wanted pulls; the pose shown"

@@ -15,47 +15,91 @@ chaining arcs costs rigid-body algebra alone. Lengths are in units of the rod's 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 
 import casadi as ca
 import numpy as np
 
-# Terms of the series of B and C below: exact to rounding up to a turn of pi in one arc.
-_TERMS = 14
+from .rotation import cross, skew
+
+_EYE = np.eye(3)
+# Terms of the series of the Stumpff functions: right to 1e-10 for half a turn in one arc.
+_TERMS = 8
 
 
-def _series(t: ca.SX, first: int) -> ca.SX:
-    """sum_k (-t)^k / (2k + first)!: (1 - cos x)/x^2 for first = 2, (x - sin x)/x^3 for 3; t = x^2.
-
-    A series has no branch at x = 0, where the closed forms and their derivatives are 0/0.
-    """
-    coefficient = 1.0
-    for i in range(2, first + 1):
-        coefficient /= i
-    coefficients = [coefficient]
-    for k in range(1, _TERMS):
-        coefficient /= -(2 * k + first - 1) * (2 * k + first)
-        coefficients.append(coefficient)
+def _stumpff(t: ca.SX, first: int) -> ca.SX:
+    """c_k(t) = sum_j (-t)^j / (2j + k)! for k = first: no branch, no 0/0 at t = 0."""
+    coefficients = [(-1.0) ** j / math.factorial(2 * j + first) for j in range(_TERMS)]
     total = ca.SX(coefficients[-1])
     for c in reversed(coefficients[:-1]):
         total = total * t + c
     return total
 
 
-def _arc(z: ca.SX, order: int, h: float) -> tuple[ca.SX, ca.SX]:
-    """Rotation (3, 3) and translation (3,) along one arc; z = (h a, h b) or (h a)."""
-    a = z[:3]
-    b = z[3:6] if order else ca.SX.zeros(3)
-    e3 = ca.SX([0, 0, 1])
-    w = a + ca.cross(a, b) / 6
-    v = h * (e3 - ca.cross(b, e3) / 6)
-    t = ca.dot(w, w)
-    big_b, big_c = _series(t, 2), _series(t, 3)
-    k = ca.skew(w)
-    rotation = ca.SX.eye(3) + (1 - t * big_c) * k + big_b * (k @ k)
-    wv = ca.cross(w, v)
-    return rotation, v + big_b * wv + big_c * ca.cross(w, wv)
+class _Arc:
+    """Rotation and translation along one arc as functions of z = (h a, h b) or (h a).
+
+    All is written in x = (w, v) of the Magnus expansion, in which derivatives are short, and taken
+    to z at the end (`in_z`). The exponential needs B = c_2(t) = (1 - cos)/t and C = c_3(t) =
+    (1 - sin/sqrt t)/t with t = |w|^2. Differentiating their series would cost most of all;
+    instead they stand as quadratics about t0 = t, whose coefficients c_k' = (k c_{k+2} -
+    c_{k+1}) / 2 are put in after differentiating.
+    """
+
+    def __init__(self, order: int, h: float) -> None:
+        self.z = ca.SX.sym("z", 3 * (order + 1))
+        a = self.z[:3]
+        b = self.z[3:6] if order else ca.SX.zeros(3)
+        e3 = ca.SX([0, 0, 1])
+        self.x = ca.SX.sym("x", 6)
+        self.x_of_z = ca.vertcat(a + ca.cross(a, b) / 6, h * (e3 - ca.cross(b, e3) / 6))
+        self.jacobian = ca.jacobian(self.x_of_z, self.z)
+        self._symbols = ca.SX.sym("c", 7)  # t0, then B, C and their derivatives
+        t0, b0, c0, b1, c1, b2, c2 = ca.vertsplit(self._symbols)
+        self.w, self.v = self.x[:3], self.x[3:]
+        self.t = ca.dot(self.w, self.w)
+        step = self.t - t0
+        self.big_b = b0 + b1 * step + b2 * step**2 / 2
+        self.big_c = c0 + c1 * step + c2 * step**2 / 2
+        k = ca.skew(self.w)
+        self.left_jacobian = ca.SX.eye(3) + self.big_b * k + self.big_c * (k @ k)
+        self.rotation = ca.SX.eye(3) + (1 - self.t * self.big_c) * k + self.big_b * (k @ k)
+        self.translation = self.left_jacobian @ self.v
+
+    def work(self, force: ca.SX, moment: ca.SX) -> ca.SX:
+        """force . translation + moment : rotation, in the fewest operations."""
+        w, v, t = self.w, self.v, self.t
+        axial = ca.vertcat(
+            moment[2, 1] - moment[1, 2], moment[0, 2] - moment[2, 0], moment[1, 0] - moment[0, 1]
+        )
+        trace = ca.trace(moment)
+        turned = (1 - t * self.big_c) * ca.dot(axial, w) + self.big_b * (ca.dot(w, moment @ w) - t * trace)
+        bent = self.big_b * ca.dot(w, ca.cross(v, force))
+        bent += self.big_c * (ca.dot(force, w) * ca.dot(w, v) - ca.dot(force, v) * t)
+        return trace + turned + ca.dot(force, v) + bent
+
+    def hessian_in_z(self, scalar: ca.SX) -> ca.SX:
+        """Hessian with respect to z of a scalar function of x."""
+        hessian, gradient = ca.hessian(scalar, self.x)
+        slope = ca.SX.sym("slope", 3)  # x is bilinear in z, in its first three rows alone
+        bilinear = ca.hessian(ca.dot(slope, self.x_of_z[:3]), self.z)[0]
+        bilinear = ca.substitute(bilinear, slope, gradient[:3])
+        return self.jacobian.T @ hessian @ self.jacobian + bilinear
+
+    def in_z(self, expression: ca.SX) -> ca.SX:
+        """The expression in z alone: values put in for B, C, their derivatives and x."""
+        t = self.t
+        c6, c7 = _stumpff(t, 6), _stumpff(t, 7)
+        c4, c5 = 1 / 24 - t * c6, 1 / 120 - t * c7
+        c2, c3 = 1 / 2 - t * c4, 1 / 6 - t * c5
+        first = (2 * c4 - c3) / 2, (3 * c5 - c4) / 2
+        d4, d5 = (4 * c6 - c5) / 2, (5 * c7 - c6) / 2
+        second = (2 * d4 - first[1]) / 2, (3 * d5 - d4) / 2
+        values = ca.vertcat(t, c2, c3, *first, *second)
+        expression = ca.substitute(expression, self._symbols, values)
+        return ca.cse(ca.substitute(expression, self.x, self.x_of_z))
 
 
 class _Buffered:
@@ -78,28 +122,21 @@ class _Buffered:
 @lru_cache(maxsize=32)
 def _functions(arcs: int, order: int) -> tuple[ca.Function, ca.Function]:
     """The chain of arcs with its twists, and the arcs' contracted second derivatives."""
-    size = 3 * (order + 1)
-    z, state = ca.SX.sym("z", size), ca.SX.sym("state", 12)
-    rotation, translation = _arc(z, order, 1.0 / arcs)
+    arc, state = _Arc(order, 1.0 / arcs), ca.SX.sym("state", 12)
+    z = arc.z
     r0, p0 = ca.reshape(state[:9], 3, 3), state[9:]
-    r1, p1 = r0 @ rotation, p0 + r0 @ translation
-    turn = ca.reshape(ca.jacobian(ca.vec(rotation), z), 9, size)
-    shift = ca.jacobian(translation, z)
-    twists = []
-    for i in range(size):
-        spin = ca.reshape(turn[:, i], 3, 3) @ rotation.T
-        omega = r0 @ ca.vertcat(spin[2, 1], spin[0, 2], spin[1, 0])
-        twists.append(ca.vertcat(omega, r0 @ shift[:, i] - ca.cross(omega, p1)))
-    step = ca.Function(
-        "step",
-        [state, z],
-        [ca.vertcat(ca.vec(r1), p1), ca.densify(ca.horzcat(*twists))],
-        {"cse": True},
-    )
+    # The rotation's derivative is the angular velocity J dw, in the frame of the arc's start.
+    spin = r0 @ (arc.left_jacobian @ arc.jacobian[:3, :])
+    shift = r0 @ (ca.jacobian(arc.translation, arc.x) @ arc.jacobian)
+    p1 = p0 + r0 @ arc.translation
+    twists = [
+        ca.vertcat(spin[:, i], shift[:, i] - ca.cross(spin[:, i], p1)) for i in range(z.numel())
+    ]
+    both = arc.in_z(ca.vertcat(ca.vec(r0 @ arc.rotation), p1, *twists))
+    step = ca.Function("step", [state, z], [both[:12], ca.reshape(both[12:], 6, z.numel())])
     force, moment = ca.SX.sym("force", 3), ca.SX.sym("moment", 3, 3)
-    work = ca.dot(force, translation) + ca.dot(moment, rotation)
-    hessian = ca.densify(ca.hessian(work, z)[0])
-    second = ca.Function("second", [z, force, moment], [hessian], {"cse": True})
+    hessian = ca.densify(arc.in_z(arc.hessian_in_z(arc.work(force, moment))))
+    second = ca.Function("second", [z, force, moment], [hessian])
     return step.mapaccum("chain", arcs), second.map(arcs)
 
 
@@ -134,6 +171,7 @@ class Rod:
         self._chain.inputs[0][:] = [1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0]
         # arc index of each coordinate: the upper triangle of pairs of coordinates of unlike arcs
         arc = np.repeat(np.arange(arcs), self.size)
+        self._diagonal = np.arange(arcs)
         self._earlier = (arc[:, None] < arc[None, :]).astype(float)
 
     def state(self, z: np.ndarray) -> RodState:
@@ -143,7 +181,7 @@ class Rod:
         states = self._chain.outputs[0].reshape(self.arcs, 12)
         rotations = np.empty((self.arcs + 1, 3, 3))
         positions = np.zeros((self.arcs + 1, 3))
-        rotations[0] = np.eye(3)
+        rotations[0] = _EYE
         rotations[1:] = states[:, :9].reshape(-1, 3, 3).transpose(0, 2, 1)
         positions[1:] = states[:, 9:]
         return RodState(rotations, positions, self._chain.outputs[1].reshape(-1, 6).copy())
@@ -164,10 +202,12 @@ class Rod:
         """
         omega, velocity = state.twists[:, :3], state.twists[:, 3:]
         total = np.repeat(forces, self.size, axis=0)
-        inertia = moments.transpose(0, 2, 1) - np.trace(moments, axis1=1, axis2=2)[:, None, None] * np.eye(3)
-        arm = (omega.reshape(self.arcs, self.size, 3) @ inertia.transpose(0, 2, 1)).reshape(-1, 3)
-        upper = (omega @ (np.cross(velocity, total) + arm).T) * self._earlier
-        hessian = upper + upper.T
+        inertia = moments - np.einsum("eii->e", moments)[:, None, None] * _EYE
+        arm = (omega.reshape(self.arcs, self.size, 3) @ inertia).reshape(-1, 3)
+        arm += cross(velocity, total)
+        hessian = omega @ arm.T
+        hessian *= self._earlier
+        hessian += hessian.T.copy()
 
         before, after = state.rotations[:-1], state.rotations[1:]
         lever = moments - forces[:, :, None] * state.positions[1:, None, :]
@@ -177,30 +217,43 @@ class Rod:
         self._second.inputs[2][:] = local.transpose(0, 2, 1).ravel()
         self._second()
         blocks = hessian.reshape(self.arcs, self.size, self.arcs, self.size)
-        diagonal = np.arange(self.arcs)
-        blocks[diagonal, :, diagonal, :] += self._second.outputs[0].reshape(-1, self.size, self.size)
+        blocks[self._diagonal, :, self._diagonal, :] += self._second.outputs[0].reshape(-1, self.size, self.size)
         return hessian
 
 
-def centerline(state: RodState, z: np.ndarray, points: int) -> np.ndarray:
-    """Return a dense backbone curve (arcs * points + 1, 3) of unit length.
+def centerline(curvature: np.ndarray, length: float, points: int) -> np.ndarray:
+    """Return a dense backbone curve (E * points + 1, 3) from its curvature, in units of ``length``.
 
-    Each arc is cut into ``points`` equal pieces; a piece from the start of an arc of linear
-    curvature is an arc of linear curvature again.
+    Integrated in numpy on its own, without the chain above. A piece from the start of an arc of
+    linear curvature is an arc of linear curvature again.
+
+    Args:
+        curvature: (E, order + 1, 3) curvature coefficients of each arc [1/unit of length].
+        length: Length of the whole rod.
+        points: Points per arc.
     """
-    arcs = len(z)
-    a, b = z[:, :3], z[:, 3:] if z.shape[1] > 3 else np.zeros((arcs, 3))
-    pieces = []
-    for k in range(1, points + 1):
-        f = k / points
-        part_a, part_b = f * (a + (f - 1) * b), f * f * b
-        w = part_a + np.cross(part_a, part_b) / 6
-        v = f / arcs * (np.array([0.0, 0.0, 1.0]) - np.cross(part_b, [0.0, 0.0, 1.0]) / 6)
-        t = np.sum(w * w, axis=1, keepdims=True)
-        angle = np.sqrt(t)
-        big_b = 0.5 * np.sinc(angle / (2 * np.pi)) ** 2
-        big_c = np.where(t < 1e-4, 1 / 6 - t / 120, (1 - np.sinc(angle / np.pi)) / np.maximum(t, 1e-4))
-        wv = np.cross(w, v)
-        local = v + big_b * wv + big_c * np.cross(w, wv)
-        pieces.append(state.positions[:-1] + (state.rotations[:-1] @ local[:, :, None])[:, :, 0])
-    return np.concatenate([state.positions[:1], np.stack(pieces, axis=1).reshape(-1, 3)])
+    arcs, order = len(curvature), curvature.shape[1] - 1
+    h = length / arcs
+    f = np.arange(1, points + 1)[None, :, None] / points
+    a = h * curvature[:, None, 0]
+    b = h * curvature[:, None, 1] if order else np.zeros_like(a)
+    part_a, part_b = f * (a + (f - 1) * b), f * f * b
+    e3 = np.array([0.0, 0.0, 1.0])
+    w = part_a + cross(part_a, part_b) / 6
+    v = f * h * (e3 - cross(part_b, e3) / 6)
+    angle = np.linalg.norm(w, axis=2, keepdims=True)
+    square = np.maximum(angle, 1e-3) ** 2
+    sine = np.sinc(angle / np.pi)
+    big_b = 0.5 * np.sinc(angle / (2 * np.pi)) ** 2
+    big_c = np.where(angle < 1e-3, 1 / 6 - angle**2 / 120, (1 - sine) / square)
+    wv = cross(w, v)
+    shifts = v + big_b * wv + big_c * cross(w, wv)
+    k = skew(w[:, -1])
+    turns = np.eye(3) + sine[:, -1, :, None] * k + big_b[:, -1, :, None] * (k @ k)
+    curve = np.zeros((arcs * points + 1, 3))
+    frame = np.eye(3)
+    for e in range(arcs):
+        first = e * points
+        curve[first + 1 : first + points + 1] = curve[first] + shifts[e] @ frame.T
+        frame = frame @ turns[e]
+    return curve

@@ -19,6 +19,17 @@ def skew(v: np.ndarray) -> np.ndarray:
     return out
 
 
+def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return a x b of vectors (..., 3); several times faster than numpy.cross on small arrays."""
+    out = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    a0, a1, a2 = a[..., 0], a[..., 1], a[..., 2]
+    b0, b1, b2 = b[..., 0], b[..., 1], b[..., 2]
+    out[..., 0] = a1 * b2 - a2 * b1
+    out[..., 1] = a2 * b0 - a0 * b2
+    out[..., 2] = a0 * b1 - a1 * b0
+    return out
+
+
 def matrix_from_quaternion(q: np.ndarray) -> np.ndarray:
     """Return the rotation matrix (3, 3) of a unit quaternion (x, y, z, w)."""
     v, w = np.asarray(q[:3], dtype=float), float(q[3])

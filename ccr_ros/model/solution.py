@@ -4,13 +4,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from .errors import NotConverged
 from .finger import Finger
+from .rod import centerline
 from .rotation import Pose, quaternion_from_matrix
+
+_CENTERLINE_POINTS = 8  # per segment
 
 
 @dataclass(frozen=True)
@@ -86,7 +90,6 @@ class Solution:
         energy: Elastic energy [J, or 1/m per EI].
         curvature: (n, arcs, order + 1, 3) curvature coefficients [1/m] of each arc in its local
             frame: mean, and (order 1) the linear part in the Legendre coordinate s in [-1, 1].
-        centerline: (p, 3) dense points of the backbone curve, disk centres included [m].
         certificate: How good the pose is.
     """
 
@@ -100,8 +103,14 @@ class Solution:
     contacts: tuple[Contact, ...]
     energy: float
     curvature: np.ndarray
-    centerline: np.ndarray
     certificate: Certificate
+
+    @cached_property
+    def centerline(self) -> np.ndarray:
+        """Dense points (p, 3) of the backbone curve, disk centres included [m]."""
+        n, arcs, order = self.curvature.shape[:3]
+        points = -(-_CENTERLINE_POINTS // arcs)
+        return centerline(self.curvature.reshape(n * arcs, order, 3), self.finger.length, points)
 
     @property
     def quaternions(self) -> np.ndarray:

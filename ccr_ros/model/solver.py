@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,19 +17,9 @@ from .result import make_solution
 from .sensitivity import Sensitivity, sensitivity
 from .settings import SolverSettings
 from .solution import Solution
-from .sqp import Bounds, KktPoint, solve_sqp
+from .sqp import Bounds, KktPoint, derive, solve_sqp
 
 _SMALLEST_STEP = 1.0 / 1024  # of the way to the target
-
-
-@dataclass
-class _State:
-    """Where the finger stands: an equilibrium for these pulls and these relaxed obstacles."""
-
-    y: np.ndarray
-    tensions: np.ndarray
-    forces: np.ndarray
-    pulls: np.ndarray
 
 
 class FingerSolver:
@@ -51,10 +41,9 @@ class FingerSolver:
         self.finger = finger
         self.problem = EquilibriumProblem(finger, settings)
         self.settings = self.problem.settings
-        self._point: KktPoint | None = None
-        self._obstacles_changed = False
-        self._state = self._rest_state()
-        self.obstacles = finger.obstacles
+        self._solved = False
+        self._check_clear_of_base(finger.obstacles)
+        self.reset()
 
     @property
     def rest_lengths(self) -> np.ndarray:
@@ -64,7 +53,7 @@ class FingerSolver:
     @property
     def rest(self) -> Solution:
         """The rest shape: no pulls, no obstacles."""
-        solver = FingerSolver(_without_obstacles(self.finger), self.settings)
+        solver = FingerSolver(replace(self.finger, obstacles=()), self.settings)
         return solver.solve(np.zeros(len(self.finger.cables)))
 
     @property
@@ -75,28 +64,24 @@ class FingerSolver:
     @obstacles.setter
     def obstacles(self, obstacles: Sequence[Obstacle]) -> None:
         obstacles = tuple(obstacles)
-        base = self.problem.points.disk == 0
-        where = self.problem.rest.points[base] * self.finger.length
-        for obstacle in obstacles:
-            deepest = float(obstacle.signed_distance(where).min())
-            if deepest < 0:
-                raise InvalidValue(
-                    f"obstacles.{obstacle.name}",
-                    obstacle,
-                    f"clear of the base disk of finger {self.finger.name!r}"
-                    f" (overlaps it by {-deepest * 1e3:.3g} mm)",
-                )
-        old = {id(o): row for o, row in zip(self.obstacles, self._state.forces, strict=False)}
-        count = len(self.problem.points.labels)
-        rows = [old.get(id(o), np.zeros(count)) for o in obstacles]
-        self._state.forces = np.array(rows).reshape(len(obstacles), count)
+        self._check_clear_of_base(obstacles)
+        # Obstacles that stay keep their contact forces as a guess.
+        old = {id(o): row for o, row in zip(self.obstacles, self._point.forces, strict=True)}
+        none = np.zeros(len(self.problem.points.labels))
+        forces = [old.get(id(o), none) for o in obstacles]
         self.problem.obstacles = obstacles
-        self._point = None
+        self._point = self._derived(self._point.at.y, self._point.tensions, forces)
+        self._solved = False
 
     def reset(self) -> None:
         """Forget the last pose: the next solve starts from the rest shape."""
-        self._state = self._rest_state()
-        self._point = None
+        self._pulls = np.zeros(len(self.finger.cables))
+        none = np.zeros(len(self.problem.points.labels))
+        tensions = np.zeros(len(self.problem.group_cable))
+        self._point = self._derived(
+            np.zeros(self.problem.size), tensions, [none] * len(self.obstacles)
+        )
+        self._solved = False
 
     def solve(self, pulls: Mapping[str, float] | Sequence[float] | np.ndarray) -> Solution:
         """Return the pose for cable pulls [m]: a mapping by cable name, or one per cable in order.
@@ -109,11 +94,10 @@ class FingerSolver:
         """
         begin = time.perf_counter()
         target = self.finger.pulls_array(pulls)
-        walk = _Walk(self.problem, self._state, target)
+        walk = _Walk(self.problem, self._point, self._pulls, target)
         point, reached = walk.run()
         if reached is None:
-            self._state = _State(point.at.y, point.tensions, point.forces, target)
-            self._point = point
+            self._point, self._pulls, self._solved = point, target, True
         return make_solution(
             self.problem, point, target, walk, reached, elapsed=lambda: time.perf_counter() - begin
         )
@@ -124,75 +108,89 @@ class FingerSolver:
         Raises:
             InvalidValue: Nothing has been solved since the start, a reset or new obstacles.
         """
-        if self._point is None:
+        if not self._solved:
             raise InvalidValue("sensitivity", None, "asked for after a converged solve")
         return sensitivity(self.problem, self._point)
 
-    def _rest_state(self) -> _State:
-        problem = self.problem
-        return _State(
-            np.zeros(problem.size),
-            np.zeros(len(problem.group_cable)),
-            np.zeros((len(problem.obstacles), len(problem.points.labels))),
-            np.zeros(len(self.finger.cables)),
-        )
+    def _derived(
+        self, y: np.ndarray, tensions: np.ndarray, forces: Sequence[np.ndarray]
+    ) -> KktPoint:
+        count = len(self.problem.points.labels)
+        table = np.array(forces).reshape(len(forces), count)
+        return derive(self.problem, self.problem.evaluate(y), tensions, table)
+
+    def _check_clear_of_base(self, obstacles: Sequence[Obstacle]) -> None:
+        base = self.problem.rest.points[self.problem.fixed] * self.finger.length
+        for obstacle in obstacles:
+            deepest = float(obstacle.signed_distance(base).min())
+            if deepest < 0:
+                raise InvalidValue(
+                    f"obstacles.{obstacle.name}",
+                    type(obstacle).__name__.lower(),
+                    f"clear of the base disk of finger {self.finger.name!r}"
+                    f" (it overlaps the disk by {-deepest * 1e3:.3g} mm)",
+                )
 
 
 class _Walk:
-    """One continuation from a state to target pulls and unrelaxed obstacles."""
+    """One continuation, from an equilibrium to target pulls and unrelaxed obstacles.
 
-    def __init__(self, problem: EquilibriumProblem, state: _State, target: np.ndarray) -> None:
+    Attributes:
+        start: (m,) pulls of the first point; the wanted ones are ``target``.
+        iterations: QP steps taken; substeps: continuation steps accepted.
+        jumped: A step could not be made short enough for the pose to change in proportion.
+    """
+
+    def __init__(
+        self, problem: EquilibriumProblem, point: KktPoint, pulls: np.ndarray, target: np.ndarray
+    ) -> None:
         self.problem = problem
-        self.start = state
+        self.point = point
+        self.start = pulls
         self.target = target
         self.iterations = 0
         self.substeps = 0
         self.jumped = False
 
     def run(self) -> tuple[KktPoint, float | None]:
-        """Return the last converged point, and None or the fraction of the way that it stands at."""
-        problem, state = self.problem, self.start
-        first = problem.evaluate(state.y)
-        inside = np.maximum(-first.distances, 0.0)
-        inside[:, problem.points.disk == 0] = 0.0
-        inside[inside < problem.settings.tolerance * 10] = 0.0
-        change = float(np.abs(self.target - state.pulls).max(initial=0.0)) / problem.finger.length
+        """Return the last converged point, and None or the fraction of the way it stands at."""
+        problem, settings = self.problem, self.problem.settings
+        inside = np.maximum(-self.point.at.distances, 0.0)
+        inside[:, problem.fixed] = 0.0
+        inside[inside < 10 * settings.tolerance] = 0.0
+        change = float(np.abs(self.target - self.start).max()) / problem.finger.length
         change = max(change, float(inside.max(initial=0.0)))
-        done, size = 0.0, min(1.0, problem.settings.max_pull_step / max(change, 1e-12))
-        y, tensions, forces = state.y, state.tensions, state.forces
-        centres = first.points[problem.points.backbone]
-        last: KktPoint | None = None
-        # Beyond this gain (tip motion per pull, units of length) a step is suspected of a jump.
+        largest = min(1.0, settings.max_pull_step / change) if change > 0 else 1.0
+        # A step that moves the finger more than this, per change, is suspected of a jump. Bending
+        # moves the tip by up to about L / (2 a) per pull.
         gain = 3.0 * problem.finger.length / problem.finger.disk_radius
+        done, size, converged_once = 0.0, largest, False
         while done < 1.0:
-            size = min(size, 1.0 - done)
-            if 1.0 - done - size < 1e-9:
-                size = 1.0 - done
-            fraction = 1.0 if size == 1.0 - done else done + size
-            pulls = self.target if fraction == 1.0 else state.pulls + fraction * (self.target - state.pulls)
+            fraction = 1.0 if done + size > 1.0 - 1e-9 else done + size
+            pulls = self.start + fraction * (self.target - self.start)
             bounds = Bounds(problem.length_bounds(pulls), (1.0 - fraction) * inside)
-            point = solve_sqp(problem, y, tensions, forces, bounds)
-            self.iterations += point.iterations
-            moved = point.at.points[problem.points.backbone] - centres
-            far = float(np.sqrt((moved * moved).sum(axis=1)).max())
-            suspect = far > 1e-3 + gain * size * change
-            if (not point.converged or suspect) and size > _SMALLEST_STEP:
+            result = solve_sqp(problem, self.point, bounds)
+            self.iterations += result.iterations
+            suspect = result.converged and self._moved(result.point) > 1e-3 + gain * size * change
+            if (suspect or not result.converged) and size > _SMALLEST_STEP:
                 size *= 0.5
                 continue
-            if not point.converged:
+            if not result.converged:
                 break
             self.jumped |= suspect
             self.substeps += 1
-            last, done = point, fraction
-            y, tensions, forces = point.at.y, point.tensions, point.forces
-            centres = point.at.points[problem.points.backbone]
-            size *= 2.0 if point.iterations <= 5 else 1.0
-            size = min(size, problem.settings.max_pull_step / max(change, 1e-12))
-        if last is None:
-            bounds = Bounds(problem.length_bounds(state.pulls), inside)
-            last = solve_sqp(problem, state.y, state.tensions, state.forces, bounds)
-            self.iterations += last.iterations
-        return last, None if done == 1.0 else done
+            self.point, done, converged_once = result.point, fraction, True
+            size = min(largest, size * (2.0 if result.iterations <= 5 else 1.0))
+        if not converged_once:  # show the pose it stood in, as it is under the old pulls
+            bounds = Bounds(problem.length_bounds(self.start), inside)
+            self.point = solve_sqp(problem, self.point, bounds).point
+        return self.point, None if done == 1.0 else done
+
+    def _moved(self, point: KktPoint) -> float:
+        """Farthest way of a disk centre from the last point (units of L)."""
+        centres = self.problem.points.backbone
+        way = point.at.points[centres] - self.point.at.points[centres]
+        return float(np.sqrt((way * way).sum(axis=1).max()))
 
 
 def solve(
@@ -202,9 +200,3 @@ def solve(
 ) -> Solution:
     """Return the pose of a finger for cable pulls [m], from rest. One-off; see `FingerSolver`."""
     return FingerSolver(finger, settings).solve(pulls)
-
-
-def _without_obstacles(finger: Finger) -> Finger:
-    from dataclasses import replace
-
-    return replace(finger, obstacles=())

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A warm-started SQP for the equilibrium problem with fixed constraint bounds.
+"""A warm-started SQP for the equilibrium problem with given constraint bounds.
 
 Each step solves the QP with the exact Hessian of the Lagrangian. Where that is not positive
 definite along the active constraints, negative directions are turned positive, so that steps go
-downhill in energy; where a symmetric pose holds the iterates at a saddle they stay there and the
-reduced Hessian tells (paper_notes: a head-on finger).
+downhill in energy. Where symmetry holds the iterates at a saddle (a finger pressed head-on onto a
+sphere) they stay there, and the reduced Hessian tells.
 """
 
 from __future__ import annotations
@@ -18,11 +18,12 @@ from .qp import solve_multipliers
 
 _BAND = 0.1  # points nearer to an obstacle than this (units of L) enter the QP
 _AUGMENT = 10.0  # weight of the active constraints' augmentation, in units of the rod's stiffness
+_ACTIVE = 1e-9  # multipliers (T L^2 / EI) above this carry force
 
 
 @dataclass(frozen=True, eq=False)
 class Bounds:
-    """Bounds of the constraints: lengths (C,) and penetrations (O, P) allowed, units of L."""
+    """Bounds of the constraints: lengths (C,) and penetrations allowed (O, P), units of L."""
 
     lengths: np.ndarray
     penetrations: np.ndarray
@@ -30,19 +31,18 @@ class Bounds:
 
 @dataclass(frozen=True, eq=False)
 class KktPoint:
-    """An iterate with its derivatives and multipliers.
+    """A pose with multipliers and all derivatives; it knows no bounds.
 
     Attributes:
         at, first: Values and first derivatives.
         tensions: (C,) multipliers of the lengths.
         forces: (O, P) multipliers of the contacts.
-        pairs: (c, 2) contact candidates (obstacle, point).
-        rows: (C + c, N) constraint gradients, lengths first; multipliers: (C + c,) theirs.
+        pairs: (c, 2) contact candidates (obstacle, point); normals: (c, 3) of the obstacle there.
+        rows: (C + c, N) constraint gradients, lengths first.
+        values: (C + c,) constraint values: lengths, and negative distances.
+        multipliers: (C + c,) tensions and the candidates' forces.
         hessian: (N, N) Hessian of the Lagrangian, exact.
-        residual: KKT residual relative to the elastic force.
-        violation: Largest constraint violation, or complementarity gap of a taut one (units of L).
-        iterations: QP steps taken.
-        converged: Both within tolerance.
+        residual: Largest unbalanced generalised force, relative to the largest elastic one or 1.
     """
 
     at: Evaluation
@@ -52,104 +52,90 @@ class KktPoint:
     pairs: np.ndarray
     normals: np.ndarray
     rows: np.ndarray
+    values: np.ndarray
     multipliers: np.ndarray
     hessian: np.ndarray
     residual: float
-    violation: float
-    iterations: int
-    converged: bool
 
     @property
     def active(self) -> np.ndarray:
         """(C + c,) constraints that carry force."""
-        return self.multipliers > 1e-9
+        return self.multipliers > _ACTIVE
+
+    def slacks(self, bounds: Bounds) -> np.ndarray:
+        """(C + c,) bound less value: negative where a constraint is violated."""
+        if len(self.pairs):
+            inside = bounds.penetrations[self.pairs[:, 0], self.pairs[:, 1]]
+            return np.concatenate([bounds.lengths, inside]) - self.values
+        return bounds.lengths - self.values
 
 
-def solve_sqp(
-    problem: EquilibriumProblem,
-    y: np.ndarray,
-    tensions: np.ndarray,
-    forces: np.ndarray,
-    bounds: Bounds,
-) -> KktPoint:
-    """Minimise the energy from ``y`` with multiplier guesses; see the module's text.
+@dataclass(frozen=True, eq=False)
+class SqpResult:
+    """Where the SQP ended, after how many QP steps, and whether at an equilibrium."""
 
-    Returns:
-        The last iterate; `KktPoint.converged` tells whether it is an equilibrium.
-    """
-    tolerance = problem.settings.tolerance
-    at = problem.evaluate(y)
-    price = 10.0
-    best = np.inf
-    point: KktPoint | None = None
-    for iteration in range(problem.settings.max_iterations + 1):
-        point, values, slacks = _assemble(problem, at, tensions, forces, bounds, iteration)
-        if point.residual <= tolerance and point.violation <= tolerance:
-            return _marked(point)
-        if iteration == problem.settings.max_iterations or not np.isfinite(point.residual):
-            break
-        step, multipliers = _qp_step(point, slacks)
-        if step is None:
-            break
-        tensions, forces = _scatter(problem, point, multipliers)
+    point: KktPoint
+    iterations: int
+    converged: bool
+
+
+def solve_sqp(problem: EquilibriumProblem, point: KktPoint, bounds: Bounds) -> SqpResult:
+    """Minimise the energy within bounds, starting from ``point``."""
+    settings = problem.settings
+    price, best = 10.0, np.inf
+    for iteration in range(settings.max_iterations):
+        slacks = point.slacks(bounds)
+        violation = _violation(point, slacks)
+        error = point.residual + violation
+        if point.residual <= settings.tolerance and violation <= settings.tolerance:
+            return SqpResult(point, iteration, True)
+        found = _qp_step(point, slacks)
+        if found is None:
+            return SqpResult(point, iteration, False)
+        step, multipliers = found
         price = max(price, 2.0 * float(multipliers.max(initial=0.0)))
-        error = point.residual + point.violation
-        # A full step that is small is Newton's own: the merit function only resists it by curvature.
-        full = error < best * 0.5 or float(np.abs(step).max()) < 1e-4
+        # Near the solution, or while the error falls, Newton's full step is best: the merit
+        # function would resist it for its curvature alone (the Maratos effect).
+        newton = error < 0.5 * best or float(np.abs(step).max()) < 1e-4
         best = min(best, error)
-        at = _line_search(problem, point, step, bounds, price, full)
-    assert point is not None
-    return point
+        at = _line_search(problem, point, step, bounds, price, newton)
+        point = derive(problem, at, *_scatter(point, multipliers))
+    return SqpResult(point, settings.max_iterations, False)
 
 
-def _marked(point: KktPoint) -> KktPoint:
-    object.__setattr__(point, "converged", True)
-    return point
-
-
-def _assemble(
-    problem: EquilibriumProblem,
-    at: Evaluation,
-    tensions: np.ndarray,
-    forces: np.ndarray,
-    bounds: Bounds,
-    iteration: int,
-) -> tuple[KktPoint, np.ndarray, np.ndarray]:
+def derive(
+    problem: EquilibriumProblem, at: Evaluation, tensions: np.ndarray, forces: np.ndarray
+) -> KktPoint:
+    """Return the KKT point of a pose with multipliers: all derivatives and the residual."""
     first = problem.linearize(at)
     near = (at.distances < _BAND) | (forces > 0)
-    near[:, problem.points.disk == 0] = False  # the base does not move
+    near[:, problem.fixed] = False
     pairs = np.argwhere(near)
-    values = at.lengths
-    limits = bounds.lengths
-    multipliers = tensions
-    rows = first.lengths
     if len(pairs):
-        contact, normals, curvatures = problem.contact_rows(at, first, pairs)
-        rows = np.concatenate([rows, contact])
         index = pairs[:, 0], pairs[:, 1]
-        values = np.concatenate([values, -at.distances[index]])
-        limits = np.concatenate([limits, bounds.penetrations[index]])
-        multipliers = np.concatenate([tensions, forces[index]])
+        contact, normals, curvatures = problem.contact_rows(at, first, pairs)
+        rows = np.concatenate([first.lengths, contact])
+        values = np.concatenate([at.lengths, -at.distances[index]])
+        pressing = forces[index]
     else:
-        normals, curvatures = np.empty((0, 3)), np.empty((0, 3, 3))
-    slacks = limits - values  # >= 0 where satisfied
-    hessian = problem.hessian(
-        at, first, tensions, pairs, normals, curvatures, multipliers[len(tensions) :]
+        normals, curvatures, pressing = np.empty((0, 3)), np.empty((0, 3, 3)), np.empty(0)
+        rows, values = first.lengths, at.lengths
+    multipliers = np.concatenate([tensions, pressing])
+    hessian = problem.hessian(at, first, tensions, pairs, normals, curvatures, pressing)
+    unbalanced = np.abs(at.y + multipliers @ rows).max()
+    residual = float(unbalanced / max(1.0, np.abs(at.y).max()))
+    return KktPoint(
+        at, first, tensions, forces, pairs, normals, rows, values, multipliers, hessian, residual
     )
-    unbalanced = at.y + multipliers @ rows
-    residual = float(np.abs(unbalanced).max() / max(1.0, np.abs(at.y).max()))
-    gap = np.where(multipliers > 1e-9, np.abs(slacks), np.maximum(-slacks, 0.0))
-    violation = float(gap.max(initial=0.0))
-    point = KktPoint(
-        at, first, tensions, forces, pairs, normals, rows, multipliers, hessian, residual, violation,
-        iteration, False,
-    )  # fmt: skip
-    return point, values, slacks
 
 
-def _scatter(
-    problem: EquilibriumProblem, point: KktPoint, multipliers: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def _violation(point: KktPoint, slacks: np.ndarray) -> float:
+    """Largest violation, or gap of a constraint that carries force (units of L)."""
+    gap = np.where(point.active, np.abs(slacks), -slacks)
+    return max(0.0, float(gap.max()))
+
+
+def _scatter(point: KktPoint, multipliers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     count = len(point.tensions)
     forces = np.zeros_like(point.forces)
     if len(point.pairs):
@@ -157,11 +143,10 @@ def _scatter(
     return multipliers[:count], forces
 
 
-def _qp_step(point: KktPoint, slacks: np.ndarray) -> tuple[np.ndarray | None, np.ndarray]:
-    """The step (N,) and new multipliers, or None where the numbers have run away."""
+def _qp_step(point: KktPoint, slacks: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+    """The step (N,) and the new multipliers; None where the QP is infeasible or not finite."""
     active = point.active
-    gradient = point.at.y
-    hessian, slope = point.hessian, gradient
+    hessian, slope = point.hessian, point.at.y
     if active.any():
         # On the active constraints A d = r the added term |A d - r|^2 vanishes with its gradient:
         # it moves neither the QP's solution nor its multipliers, but makes the matrix definite
@@ -169,23 +154,22 @@ def _qp_step(point: KktPoint, slacks: np.ndarray) -> tuple[np.ndarray | None, np
         held = point.rows[active]
         weight = _AUGMENT / np.maximum(np.einsum("ij,ij->i", held, held), 1e-12)
         hessian = hessian + (held.T * weight) @ held
-        slope = gradient - held.T @ (weight * slacks[active])
-    hessian = definite(hessian)
-    if hessian is None:
-        return None, point.multipliers
-    solved = np.linalg.solve(hessian, np.column_stack([slope, point.rows.T]))
-    s = point.rows @ solved[:, 1:]
-    r = slacks + point.rows @ solved[:, 0]
-    multipliers = solve_multipliers(0.5 * (s + s.T), r, active)
+        slope = slope - held.T @ (weight * slacks[active])
+    definite = _definite(hessian)
+    if definite is None:
+        return None
+    solved = np.linalg.solve(definite, np.concatenate([slope[None], point.rows]).T)
+    gram = point.rows @ solved
+    multipliers = solve_multipliers(
+        0.5 * (gram[:, 1:] + gram[:, 1:].T), slacks + gram[:, 0], active
+    )
     if multipliers is None:
-        return None, point.multipliers
+        return None
     step = -(solved[:, 0] + solved[:, 1:] @ multipliers)
-    if not np.all(np.isfinite(step)):
-        return None, point.multipliers
-    return step, multipliers
+    return (step, multipliers) if np.all(np.isfinite(step)) else None
 
 
-def definite(matrix: np.ndarray) -> np.ndarray | None:
+def _definite(matrix: np.ndarray) -> np.ndarray | None:
     """Return the matrix, its negative eigenvalues turned positive; None if it is not finite."""
     try:
         np.linalg.cholesky(matrix)
@@ -193,14 +177,14 @@ def definite(matrix: np.ndarray) -> np.ndarray | None:
         if not np.all(np.isfinite(matrix)):
             return None
         values, vectors = np.linalg.eigh(matrix)
-        values = np.maximum(np.abs(values), 1e-3)
-        return (vectors * values) @ vectors.T
+        return (vectors * np.maximum(np.abs(values), 1e-3)) @ vectors.T
     return matrix
 
 
-def _merit(at: Evaluation, bounds: Bounds, price: float, moving: np.ndarray) -> float:
+def _merit(at: Evaluation, bounds: Bounds, price: float, fixed: np.ndarray) -> float:
+    """Energy plus the price of all violations: an exact (l1) penalty."""
     over = np.maximum(at.lengths - bounds.lengths, 0.0).sum()
-    inside = np.maximum(-at.distances - bounds.penetrations, 0.0)[:, moving].sum()
+    inside = np.maximum(-at.distances - bounds.penetrations, 0.0)[:, ~fixed].sum()
     return 0.5 * float(at.y @ at.y) + price * float(over + inside)
 
 
@@ -210,18 +194,17 @@ def _line_search(
     step: np.ndarray,
     bounds: Bounds,
     price: float,
-    full: bool,
+    newton: bool,
 ) -> Evaluation:
-    moving = problem.points.disk > 0
-    length = float(np.abs(step * np.tile(problem.coordinate_scale, problem.arcs)).max())
-    size = min(1.0, 0.5 / length) if length > 0 else 1.0  # at most 0.5 rad in one arc
+    turn = float(np.abs(step).max()) * problem.largest_scale
+    size = min(1.0, 0.5 / turn) if turn > 0 else 1.0  # at most 0.5 rad in one arc
     trial = problem.evaluate(point.at.y + size * step)
-    if full and size == 1.0:
+    if newton and size == 1.0:
         return trial
-    start = _merit(point.at, bounds, price, moving)
+    start = _merit(point.at, bounds, price, problem.fixed)
     for _ in range(12):
-        if _merit(trial, bounds, price, moving) <= start - 1e-6 * size * abs(start):
-            return trial
+        if _merit(trial, bounds, price, problem.fixed) <= start - 1e-6 * size * abs(start):
+            break
         size *= 0.5
         trial = problem.evaluate(point.at.y + size * step)
     return trial
