@@ -13,13 +13,20 @@ from .solution import Certificate, Contact, Solution
 from .sqp import KktPoint
 
 
-class Walk(Protocol):
-    """What the certificate needs to know of the continuation."""
+_STABLE = 1e-6  # a reduced Hessian with an eigenvalue below this is at a branch point, or past it
 
+
+class Walk(Protocol):
+    """What the solution needs to know of the continuation; see `solver`."""
+
+    point: KktPoint
+    pulls: np.ndarray
+    reached: float | None
     iterations: int
     substeps: int
     jumped: bool
-    start: np.ndarray
+    met: tuple[int, int] | None
+    late: bool
 
 
 def smallest_reduced_eigenvalue(point: KktPoint) -> float:
@@ -38,14 +45,10 @@ def smallest_reduced_eigenvalue(point: KktPoint) -> float:
 
 
 def make_solution(
-    problem: EquilibriumProblem,
-    point: KktPoint,
-    pulls: np.ndarray,
-    walk: Walk,
-    reached: float | None,
-    elapsed: Callable[[], float],
+    problem: EquilibriumProblem, pulls: np.ndarray, walk: Walk, elapsed: Callable[[], float]
 ) -> Solution:
-    """Assemble the solution; ``reached`` is None, or the fraction of the way that converged."""
+    """Assemble the solution that a walk towards ``pulls`` (m,) has ended at."""
+    point = walk.point
     finger, at, length = problem.finger, point.at, problem.finger.length
     force_unit = finger.bending_stiffness / length**2
     disks = np.arange(finger.segments + 1) * problem.settings.arcs_per_segment
@@ -56,9 +59,9 @@ def make_solution(
     arcs = (finger.segments, problem.settings.arcs_per_segment, problem.settings.curvature_order + 1, 3)
     metres = at.points * length
     names = finger.cable_names
-    cable_error, penetration = _errors(problem, point, pulls)
-    converged = reached is None
-    stable = eigenvalue > 0.0
+    cable_error, penetration = _errors(problem, point, walk.pulls)
+    converged = walk.reached is None
+    stable = eigenvalue > _STABLE
     certificate = Certificate(
         converged=converged,
         stable=stable,
@@ -70,7 +73,7 @@ def make_solution(
         solve_time=elapsed(),
         branch_jump=walk.jumped,
         substeps=walk.substeps,
-        message=_message(problem, pulls, walk, reached, stable),
+        message=_message(problem, walk, stable),
     )
     return Solution(
         finger=finger,
@@ -79,7 +82,7 @@ def make_solution(
         frames=at.rod.rotations[disks],
         cables={n: metres[i] for n, i in zip(names, problem.points.cable, strict=True)},
         antagonists={n: metres[i] for n, i in zip(names, problem.points.antagonist, strict=True)},
-        tensions=point.tensions[base_group] * force_unit,
+        tensions=np.where(point.active[base_group], point.tensions[base_group], 0.0) * force_unit,
         contacts=_contacts(problem, point, force_unit),
         energy=0.5 * float(at.y @ at.y) * finger.bending_stiffness / length,
         curvature=z.reshape(arcs) / length,
@@ -115,19 +118,39 @@ def _contacts(problem: EquilibriumProblem, point: KktPoint, unit: float) -> tupl
     return tuple(sorted(contacts, key=lambda c: (c.disk, c.obstacle, c.point)))
 
 
-def _message(
-    problem: EquilibriumProblem, pulls: np.ndarray, walk: Walk, reached: float | None, stable: bool
-) -> str:
-    if reached is not None:
-        shown = walk.start + reached * (pulls - walk.start)
-        where = ", ".join(f"{n}={p:.6g} m" for n, p in zip(problem.finger.cable_names, shown, strict=True))
+def meeting_disks(problem: EquilibriumProblem, point: KktPoint) -> tuple[int, int] | None:
+    """The first two neighbouring disks that cut each other, or None; disks are taken as thin."""
+    centres = point.at.points[problem.points.backbone]
+    step = problem.settings.arcs_per_segment
+    axes = point.at.rod.rotations[::step, :, 2]
+    between = centres[1:] - centres[:-1]
+    cosine = np.einsum("ij,ij->i", axes[1:], axes[:-1])
+    # How far the rim of either disk dips below the other's centre plane.
+    dip = problem.finger.disk_radius / problem.finger.length * np.sqrt(np.maximum(1 - cosine**2, 0))
+    lift = np.minimum(
+        np.einsum("ij,ij->i", between, axes[:-1]), np.einsum("ij,ij->i", between, axes[1:])
+    )
+    cut = np.flatnonzero(lift < dip)
+    return (int(cut[0]), int(cut[0]) + 1) if len(cut) else None
+
+
+def _message(problem: EquilibriumProblem, walk: Walk, stable: bool) -> str:
+    if walk.reached is not None:
+        names = problem.finger.cable_names
+        where = ", ".join(f"{n}={p:.6g} m" for n, p in zip(names, walk.pulls, strict=True))
+        if walk.met is not None:
+            why = f"disks {walk.met[0]} and {walk.met[1]} meet beyond"
+        elif walk.late:
+            why = f"the time limit of {problem.settings.time_limit:g} s ended the search at"
+        else:
+            why = "no equilibrium was found beyond"
         return (
-            f"no equilibrium found beyond {reached:.1%} of the way to the wanted pulls; the pose shown"
-            f" is that of {where}. Pull less, or give the obstacles more room."
+            f"{why} {walk.reached:.1%} of the way to the wanted pulls; the pose shown is that of"
+            f" {where}. Pull less, or give the obstacles more room."
         )
     notes = []
     if walk.jumped:
-        notes.append("the finger snapped through to another branch on the way")
+        notes.append("the finger snapped to another branch of equilibria on the way")
     if not stable:
-        notes.append("the pose is unstable: a saddle of the energy, which a disturbance leaves")
+        notes.append("the pose is not a strict minimum of the energy (a saddle or branch point): a disturbance moves it")
     return "; ".join(notes)

@@ -24,14 +24,16 @@ class SolverSettings:
         max_iterations: Of one continuation step.
         tolerance: Largest residual force relative to the elastic one, and largest constraint
             violation relative to the finger's length.
+        time_limit: Of one solve [s]; a solve that takes longer ends as not converged.
     """
 
     arcs_per_segment: int = 1
     curvature_order: int = 1
     cable_model: str = "frictionless"
     max_pull_step: float = 0.02
-    max_iterations: int = 40
+    max_iterations: int = 25
     tolerance: float = 1e-9
+    time_limit: float = 1.0
 
     def __post_init__(self) -> None:
         checks.integer("arcs_per_segment", self.arcs_per_segment, low=1, high=64)
@@ -41,3 +43,4 @@ class SolverSettings:
         checks.real("max_pull_step", self.max_pull_step, above=0, high=1)
         checks.integer("max_iterations", self.max_iterations, low=1)
         checks.real("tolerance", self.tolerance, above=0, high=1e-3)
+        checks.real("time_limit", self.time_limit, above=0, unit="s")

@@ -13,13 +13,14 @@ from .equilibrium import EquilibriumProblem
 from .errors import InvalidValue
 from .finger import Finger
 from .obstacles import Obstacle
-from .result import make_solution
+from .result import make_solution, meeting_disks
 from .sensitivity import Sensitivity, sensitivity
 from .settings import SolverSettings
 from .solution import Solution
 from .sqp import Bounds, KktPoint, derive, solve_sqp
 
-_SMALLEST_STEP = 1.0 / 1024  # of the way to the target
+_SMALLEST_STEP = 1.0 / 512  # of the way to the target
+_NUDGE = 1e-2  # departure from a pose at which symmetry leaves the QP without a solution
 
 
 class FingerSolver:
@@ -71,7 +72,7 @@ class FingerSolver:
         forces = [old.get(id(o), none) for o in obstacles]
         self.problem.obstacles = obstacles
         self._point = self._derived(self._point.at.y, self._point.tensions, forces)
-        self._solved = False
+        self._obstacles_changed, self._solved = True, False
 
     def reset(self) -> None:
         """Forget the last pose: the next solve starts from the rest shape."""
@@ -81,7 +82,7 @@ class FingerSolver:
         self._point = self._derived(
             np.zeros(self.problem.size), tensions, [none] * len(self.obstacles)
         )
-        self._solved = False
+        self._obstacles_changed, self._solved = True, False
 
     def solve(self, pulls: Mapping[str, float] | Sequence[float] | np.ndarray) -> Solution:
         """Return the pose for cable pulls [m]: a mapping by cable name, or one per cable in order.
@@ -94,12 +95,17 @@ class FingerSolver:
         """
         begin = time.perf_counter()
         target = self.finger.pulls_array(pulls)
-        walk = _Walk(self.problem, self._point, self._pulls, target)
-        point, reached = walk.run()
-        if reached is None:
-            self._point, self._pulls, self._solved = point, target, True
+        walk = _Walk(self.problem, self._point, self._pulls, begin + self.settings.time_limit)
+        if self._obstacles_changed:
+            # Objects come and go at once, and the finger with them: that is no jump of its own.
+            walk.run(self._pulls, watched=False)
+        if walk.reached is None:
+            walk.run(target, watched=True)
+        if walk.reached is None:
+            self._point, self._pulls = walk.point, target
+            self._obstacles_changed, self._solved = False, True
         return make_solution(
-            self.problem, point, target, walk, reached, elapsed=lambda: time.perf_counter() - begin
+            self.problem, target, walk, elapsed=lambda: time.perf_counter() - begin
         )
 
     def sensitivity(self) -> Sensitivity:
@@ -133,58 +139,76 @@ class FingerSolver:
 
 
 class _Walk:
-    """One continuation, from an equilibrium to target pulls and unrelaxed obstacles.
+    """A continuation from an equilibrium to other pulls and unrelaxed obstacles.
 
     Attributes:
-        start: (m,) pulls of the first point; the wanted ones are ``target``.
+        point: Where it stands; pulls: (m,) the pulls there.
+        reached: None once the target is reached; else the fraction of the way that was, in [0, 1).
         iterations: QP steps taken; substeps: continuation steps accepted.
         jumped: A step could not be made short enough for the pose to change in proportion.
+        met: Disks that would meet beyond ``point``, or None.
+        late: The time limit ended the walk.
     """
 
     def __init__(
-        self, problem: EquilibriumProblem, point: KktPoint, pulls: np.ndarray, target: np.ndarray
+        self, problem: EquilibriumProblem, point: KktPoint, pulls: np.ndarray, deadline: float
     ) -> None:
         self.problem = problem
         self.point = point
-        self.start = pulls
-        self.target = target
+        self.pulls = pulls
+        self.reached: float | None = None
         self.iterations = 0
         self.substeps = 0
         self.jumped = False
+        self.met: tuple[int, int] | None = None
+        self.late = False
+        self._deadline = deadline
 
-    def run(self) -> tuple[KktPoint, float | None]:
-        """Return the last converged point, and None or the fraction of the way it stands at."""
+    def run(self, target: np.ndarray, watched: bool) -> None:
+        """Walk to the target pulls; ``watched``: halve the steps until the pose follows them."""
         problem, settings = self.problem, self.problem.settings
+        start = self.pulls
         inside = np.maximum(-self.point.at.distances, 0.0)
         inside[:, problem.fixed] = 0.0
         inside[inside < 10 * settings.tolerance] = 0.0
-        change = float(np.abs(self.target - self.start).max()) / problem.finger.length
+        change = float(np.abs(target - start).max()) / problem.finger.length
         change = max(change, float(inside.max(initial=0.0)))
         largest = min(1.0, settings.max_pull_step / change) if change > 0 else 1.0
         # A step that moves the finger more than this, per change, is suspected of a jump. Bending
         # moves the tip by up to about L / (2 a) per pull.
         gain = 3.0 * problem.finger.length / problem.finger.disk_radius
-        done, size, converged_once = 0.0, largest, False
+        done, size, nudged = 0.0, largest, False
         while done < 1.0:
             fraction = 1.0 if done + size > 1.0 - 1e-9 else done + size
-            pulls = self.start + fraction * (self.target - self.start)
+            pulls = start + fraction * (target - start)
             bounds = Bounds(problem.length_bounds(pulls), (1.0 - fraction) * inside)
             result = solve_sqp(problem, self.point, bounds)
             self.iterations += result.iterations
-            suspect = result.converged and self._moved(result.point) > 1e-3 + gain * size * change
-            if (suspect or not result.converged) and size > _SMALLEST_STEP:
+            self.met = meeting_disks(problem, result.point) if result.converged else None
+            good = result.converged and self.met is None
+            suspect = good and watched and self._moved(result.point) > 1e-3 + gain * size * change
+            self.late = time.perf_counter() > self._deadline
+            if (suspect or not good) and size > _SMALLEST_STEP and not self.late:
                 size *= 0.5
                 continue
-            if not result.converged:
-                break
-            self.jumped |= suspect
+            if not good and not nudged and not self.late and self.met is None:
+                self._nudge()
+                nudged, size = True, largest
+                continue
+            if not good:
+                self.reached = done
+                return
+            self.jumped |= suspect or (nudged and fraction == 1.0)
             self.substeps += 1
-            self.point, done, converged_once = result.point, fraction, True
+            self.point, self.pulls, done = result.point, pulls, fraction
             size = min(largest, size * (2.0 if result.iterations <= 5 else 1.0))
-        if not converged_once:  # show the pose it stood in, as it is under the old pulls
-            bounds = Bounds(problem.length_bounds(self.start), inside)
-            self.point = solve_sqp(problem, self.point, bounds).point
-        return self.point, None if done == 1.0 else done
+        self.pulls = target
+
+    def _nudge(self) -> None:
+        """Leave a pose whose symmetry makes a constraint's gradient vanish (a tip pressed head-on)."""
+        point = self.point
+        y = point.at.y + _NUDGE * np.cos(np.arange(self.problem.size))
+        self.point = derive(self.problem, self.problem.evaluate(y), point.tensions, point.forces)
 
     def _moved(self, point: KktPoint) -> float:
         """Farthest way of a disk centre from the last point (units of L)."""
