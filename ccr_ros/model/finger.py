@@ -183,7 +183,8 @@ class Finger:
 
         Raises:
             UnknownName: A name that is no cable of this finger.
-            InvalidValue: Wrong count, or a pull that is not finite or beyond the finger's length.
+            InvalidValue: Wrong count, or a pull that is not finite or beyond twice the finger's length
+                either way; the solver knows each cable's own limit.
         """
         if isinstance(pulls, Mapping):
             for key in pulls:
@@ -198,7 +199,7 @@ class Finger:
                 raise InvalidValue(
                     "pulls", values, f"{len(self.cables)} numbers [m], one per cable (got {len(values)})"
                 )
-        limit = self.length
+        limit = 2 * self.length
         return np.array(
             [
                 checks.real(f"pulls.{c}", v, low=-limit, high=limit, unit="m")

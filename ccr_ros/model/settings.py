@@ -16,7 +16,7 @@ class SolverSettings:
     Attributes:
         arcs_per_segment: Number of arcs a segment is made of.
         curvature_order: 1: curvature linear along each arc (default: one such arc per segment is
-            closer to the rod than eight of constant curvature); 0: constant-curvature arcs.
+            as close to the rod as four of constant curvature); 0: constant-curvature arcs.
         cable_model: ``"frictionless"``: a cable's total length is bounded, its tension uniform;
             ``"proportional"``: each span's length is bounded, as in the paper's section 2.2.2.
         max_pull_step: Largest pull change of one continuation step, as a fraction of the finger's

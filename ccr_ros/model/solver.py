@@ -95,6 +95,15 @@ class FingerSolver:
         """
         begin = time.perf_counter()
         target = self.finger.pulls_array(pulls)
+        for name, pull, rest in zip(
+            self.finger.cable_names, target, self.rest_lengths, strict=True
+        ):
+            if pull >= rest:
+                raise InvalidValue(
+                    f"pulls.{name}",
+                    float(pull),
+                    f"less than the cable's length inside the finger, {rest:.6g} m",
+                )
         walk = _Walk(self.problem, self._point, self._pulls, begin + self.settings.time_limit)
         if self._obstacles_changed:
             # Objects come and go at once, and the finger with them: that is no jump of its own.
