@@ -4,12 +4,15 @@
 from __future__ import annotations
 
 import math
+import re
 from numbers import Integral, Real
 from typing import Any
 
 import numpy as np
 
 from .errors import InvalidValue
+
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
 
 
 def real(
@@ -29,10 +32,14 @@ def real(
         f"< {below:g}" if below < math.inf else "",
         f"<= {high:g}" if high < math.inf else "",
     ]
-    allowed = " and ".join(["a finite number" + (f" [{unit}]" if unit else "")] + [x for x in limits if x])
+    words = ["a finite number", " and ".join(x for x in limits if x), f"[{unit}]" if unit else ""]
+    allowed = " ".join(x for x in words if x)
     if isinstance(value, bool | np.bool_) or not isinstance(value, Real):
         raise InvalidValue(place, value, allowed)
-    number = float(value)
+    try:
+        number = float(value)
+    except OverflowError:  # an int beyond any float
+        number = math.inf
     if not (math.isfinite(number) and above < number < below and low <= number <= high):
         raise InvalidValue(place, value, allowed)
     return number
@@ -43,19 +50,32 @@ def integer(place: str, value: Any, *, low: int, high: int | None = None) -> int
     allowed = f"an integer >= {low}" if high is None else f"an integer {low}..{high}"
     if isinstance(value, bool | np.bool_) or not isinstance(value, Integral):
         raise InvalidValue(place, value, allowed)
-    if value < low or (high is not None and value > high):
+    number = int(value)
+    if number < low or (high is not None and number > high):
         raise InvalidValue(place, value, allowed)
-    return int(value)
+    return number
 
 
-def vector(place: str, value: Any, size: int, *, unit: str = "") -> np.ndarray:
-    """Return ``value`` as a read-only finite float vector of the given size."""
+def is_list(value: Any) -> bool:
+    """Tell whether ``value`` is a list, a tuple or an array of at least one dimension."""
+    return isinstance(value, list | tuple) or (isinstance(value, np.ndarray) and value.ndim > 0)
+
+
+def vector(
+    place: str, value: Any, size: int, *, unit: str = "", largest: float = math.inf
+) -> np.ndarray:
+    """Return ``value`` as a read-only float vector of the given size, each |number| <= largest."""
     allowed = f"{size} finite numbers" + (f" [{unit}]" if unit else "")
-    if not isinstance(value, list | tuple | np.ndarray):
+    if not is_list(value):
         raise InvalidValue(place, value, allowed)
     if len(value) != size:
         raise InvalidValue(place, value, f"{allowed} (got {len(value)})")
-    array = np.array([real(f"{place}[{i}]", v, unit=unit) for i, v in enumerate(value)])
+    array = np.array(
+        [
+            real(f"{place}[{i}]", v, low=-largest, high=largest, unit=unit)
+            for i, v in enumerate(value)
+        ]
+    )
     array.setflags(write=False)
     return array
 
@@ -63,7 +83,7 @@ def vector(place: str, value: Any, size: int, *, unit: str = "") -> np.ndarray:
 def direction(place: str, value: Any) -> np.ndarray:
     """Return ``value`` as a read-only unit 3-vector; it may not be (nearly) zero."""
     array = vector(place, value, 3)
-    norm = float(np.linalg.norm(array))
+    norm = math.hypot(*array)  # unlike numpy's, does not overflow on the way
     if not 1e-9 < norm < math.inf:
         raise InvalidValue(place, value, "a non-zero 3-vector")
     unit = array / norm
@@ -72,11 +92,9 @@ def direction(place: str, value: Any) -> np.ndarray:
 
 
 def name(place: str, value: Any) -> str:
-    """Return ``value`` as a name usable in a ROS topic: a letter, then letters, digits and ``_``."""
-    allowed = "a name of letters, digits and single '_' that starts with a letter"
-    if not isinstance(value, str) or not value.isascii() or not value.replace("_", "a").isalnum():
-        raise InvalidValue(place, value, allowed)
-    if not value[0].isalpha() or "__" in value:
+    """Return ``value`` as a name usable in a ROS topic: a letter, then letters, digits, ``_``."""
+    if not isinstance(value, str) or not _NAME.fullmatch(value) or "__" in value:
+        allowed = "a name of at most 64 letters, digits and single '_' that starts with a letter"
         raise InvalidValue(place, value, allowed)
     return value
 
@@ -84,9 +102,11 @@ def name(place: str, value: Any) -> str:
 def quaternion(place: str, value: Any) -> np.ndarray:
     """Return ``value`` (x, y, z, w) as a read-only unit quaternion; within 1 % of unit length."""
     array = vector(place, value, 4)
-    norm = float(np.linalg.norm(array))
+    norm = math.hypot(*array)
     if not abs(norm - 1.0) <= 0.01:
-        raise InvalidValue(place, value, f"a unit quaternion (x, y, z, w); its length is {norm:.6g}")
+        raise InvalidValue(
+            place, value, f"a unit quaternion (x, y, z, w); its length is {norm:.6g}"
+        )
     unit = array / norm
     unit.setflags(write=False)
     return unit

@@ -14,6 +14,9 @@ from . import checks
 from .errors import InvalidValue, UnknownName
 from .obstacles import Obstacle
 
+MAX_SEGMENTS = 1000
+_TINY, _HUGE = 1e-6, 1e3  # m; between these a length is believed
+
 
 @dataclass(frozen=True, eq=False)
 class Cable:
@@ -30,7 +33,7 @@ class Cable:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "name", checks.name("name", self.name))
-        count = len(self.angles) if isinstance(self.angles, list | tuple | np.ndarray) else 0
+        count = len(self.angles) if checks.is_list(self.angles) else 0
         if count < 2:
             raise InvalidValue("angles", self.angles, "a list of at least 2 hole angles [rad]")
         object.__setattr__(self, "angles", checks.vector("angles", self.angles, count, unit="rad"))
@@ -42,18 +45,21 @@ class Cable:
 
     @classmethod
     def from_holes(cls, name: str, holes: Sequence[int], holes_per_disk: int = 12) -> Cable:
-        """Make a cable from clock holes 1..holes_per_disk, hole k at angle 2 pi (k - 1) / holes_per_disk."""
-        if not isinstance(holes, list | tuple | np.ndarray):
-            raise InvalidValue("holes", holes, "a list of hole numbers, one per disk")
+        """Make a cable from clock holes 1..holes_per_disk: k at 2 pi (k - 1) / holes_per_disk."""
+        if not checks.is_list(holes):
+            raise InvalidValue("holes", holes, "a list of hole numbers, one per disk from the base")
+        if len(holes) < 2:
+            raise InvalidValue("holes", holes, "a list of at least 2 hole numbers")
         numbers = [
-            checks.integer(f"holes[{i}]", h, low=1, high=holes_per_disk) for i, h in enumerate(holes)
+            checks.integer(f"holes[{i}]", h, low=1, high=holes_per_disk)
+            for i, h in enumerate(holes)
         ]
         return cls(name, np.array([2 * math.pi * (h - 1) / holes_per_disk for h in numbers]))
 
 
 @dataclass(frozen=True, eq=False)
 class Finger:
-    """A cable-driven continuum finger at rest, standing on its base disk: z along the backbone there.
+    """A cable-driven continuum finger at rest; its frame is the base disk's, z along the backbone.
 
     Attributes:
         name: Name of the finger.
@@ -86,22 +92,31 @@ class Finger:
             object.__setattr__(self, key, value)
 
         put("name", checks.name("name", self.name))
-        put("length", checks.real("length", self.length, above=0, unit="m"))
-        put("segments", checks.integer("segments", self.segments, low=2, high=1000))
-        put("disk_radius", checks.real("disk_radius", self.disk_radius, above=0, below=self.length, unit="m"))
+        put("length", checks.real("length", self.length, low=_TINY, high=_HUGE, unit="m"))
+        put("segments", checks.integer("segments", self.segments, low=2, high=MAX_SEGMENTS))
+        radius = checks.real(
+            "disk_radius", self.disk_radius, low=_TINY, below=self.length, unit="m"
+        )
+        put("disk_radius", radius)
         put(
             "backbone_diameter",
             checks.real(
-                "backbone_diameter", self.backbone_diameter, above=0, below=2 * self.disk_radius, unit="m"
+                "backbone_diameter", self.backbone_diameter, low=_TINY, below=2 * radius, unit="m"
             ),
         )
         put("poisson_ratio", checks.real("poisson_ratio", self.poisson_ratio, above=-1, high=0.5))
         if self.youngs_modulus is not None:
-            put("youngs_modulus", checks.real("youngs_modulus", self.youngs_modulus, above=0, unit="Pa"))
-        put("holes_per_disk", checks.integer("holes_per_disk", self.holes_per_disk, low=1, high=3600))
+            modulus = checks.real(
+                "youngs_modulus", self.youngs_modulus, low=1, high=1e15, unit="Pa"
+            )
+            put("youngs_modulus", modulus)
+        put(
+            "holes_per_disk",
+            checks.integer("holes_per_disk", self.holes_per_disk, low=1, high=3600),
+        )
         put("rest_curvature", self._checked_rest_curvature())
         put("cables", self._checked_cables())
-        put("obstacles", tuple(self.obstacles))
+        put("obstacles", self._checked_obstacles())
 
     def _checked_rest_curvature(self) -> np.ndarray:
         n, value = self.segments, self.rest_curvature
@@ -109,12 +124,15 @@ class Finger:
             rest = np.zeros((n, 3))
         else:
             allowed = f"{n} vectors of 3 numbers [1/m], one per segment"
-            if not isinstance(value, list | tuple | np.ndarray):
+            if not checks.is_list(value):
                 raise InvalidValue("rest_curvature", value, allowed)
             if len(value) != n:
                 raise InvalidValue("rest_curvature", value, f"{allowed} (got {len(value)})")
             rest = np.array(
-                [checks.vector(f"rest_curvature[{i}]", v, 3, unit="1/m") for i, v in enumerate(value)]
+                [
+                    checks.vector(f"rest_curvature[{i}]", v, 3, unit="1/m")
+                    for i, v in enumerate(value)
+                ]
             )
         # A segment bent further than half a turn, or so tightly that the inner side of a disk
         # folds onto the next, is no finger.
@@ -132,21 +150,33 @@ class Finger:
         return rest
 
     def _checked_cables(self) -> tuple[Cable, ...]:
+        if not isinstance(self.cables, list | tuple) or not self.cables:
+            raise InvalidValue("cables", self.cables, "a list of at least one cable")
         cables = tuple(self.cables)
-        if not cables:
-            raise InvalidValue("cables", [], "a list of at least one cable")
         seen: set[str] = set()
         for j, cable in enumerate(cables):
+            if not isinstance(cable, Cable):
+                raise InvalidValue(f"cables[{j}]", cable, "a Cable")
             if cable.last_disk > self.segments:
                 raise InvalidValue(
-                    f"cables[{j}]",
-                    len(cable.angles),
-                    f"at most {self.segments + 1} holes (one per disk, base to tip)",
+                    f"cables[{j}].angles",
+                    cable.angles,
+                    f"a list of 2..{self.segments + 1} numbers, one per disk from the base"
+                    f" (got {len(cable.angles)})",
                 )
             if cable.name in seen:
                 raise InvalidValue(f"cables[{j}].name", cable.name, "unique in its finger")
             seen.add(cable.name)
         return cables
+
+    def _checked_obstacles(self) -> tuple[Obstacle, ...]:
+        if not isinstance(self.obstacles, list | tuple):
+            raise InvalidValue("obstacles", self.obstacles, "a list of obstacles")
+        for i, obstacle in enumerate(self.obstacles):
+            if not isinstance(obstacle, Obstacle):
+                allowed = "an obstacle (Sphere, Cylinder, Box or Plane)"
+                raise InvalidValue(f"obstacles[{i}]", obstacle, allowed)
+        return tuple(self.obstacles)
 
     @property
     def segment_length(self) -> float:
@@ -183,8 +213,8 @@ class Finger:
 
         Raises:
             UnknownName: A name that is no cable of this finger.
-            InvalidValue: Wrong count, or a pull that is not finite or beyond twice the finger's length
-                either way; the solver knows each cable's own limit.
+            InvalidValue: Wrong count, or a pull that is not finite or beyond twice the finger's
+                length either way; the solver knows each cable's own limit.
         """
         if isinstance(pulls, Mapping):
             for key in pulls:
@@ -192,12 +222,14 @@ class Finger:
                     raise UnknownName("cable", key, self.cable_names)
             values: list[Any] = [pulls.get(c, 0.0) for c in self.cable_names]
         else:
-            if not isinstance(pulls, list | tuple | np.ndarray) or np.ndim(pulls) != 1:
+            if not checks.is_list(pulls) or getattr(pulls, "ndim", 1) != 1:
                 raise InvalidValue("pulls", pulls, f"{len(self.cables)} numbers [m], one per cable")
             values = list(pulls)
             if len(values) != len(self.cables):
                 raise InvalidValue(
-                    "pulls", values, f"{len(self.cables)} numbers [m], one per cable (got {len(values)})"
+                    "pulls",
+                    values,
+                    f"{len(self.cables)} numbers [m], one per cable (got {len(values)})",
                 )
         limit = 2 * self.length
         return np.array(

@@ -9,19 +9,20 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
 from . import checks
 from .rotation import Pose, matrix_from_quaternion, quaternion_from_matrix
 
+_FAR = 1e6  # m; beyond, rounding errors of a distance would exceed the solver's tolerance
 _TINY = 1e-12  # m; where a normal is undefined (a sphere's centre), any unit vector serves
 
 
 @dataclass(frozen=True, eq=False)
 class Obstacle(ABC):
-    """A rigid body that disks and cables may touch but not enter. Frames: that of the finger's base."""
+    """A rigid body that disks and cables may touch but not enter, in the finger's base frame."""
 
     name: str = field(default="obstacle", kw_only=True)
 
@@ -47,9 +48,15 @@ class Obstacle(ABC):
 
 def _radial(offset: np.ndarray, span: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Normal and Hessian of |offset|, offset (P, 3) living in the subspace projected on by span."""
-    r = np.maximum(np.linalg.norm(offset, axis=1), _TINY)
+    r = np.linalg.norm(offset, axis=1)
+    central = r < _TINY
+    r = np.maximum(r, _TINY)
     normal = offset / r[:, None]
     hessian = (span - normal[:, :, None] * normal[:, None, :]) / r[:, None, None]
+    if central.any():
+        any_way = span[np.argmax(np.diagonal(span))]
+        normal[central] = any_way / np.linalg.norm(any_way)
+        hessian[central] = 0.0
     return normal, hessian
 
 
@@ -63,8 +70,8 @@ class Sphere(Obstacle):
     def __post_init__(self) -> None:
         super().__post_init__()
         self._set(
-            center=checks.vector("center", self.center, 3, unit="m"),
-            radius=checks.real("radius", self.radius, above=0, unit="m"),
+            center=checks.vector("center", self.center, 3, unit="m", largest=_FAR),
+            radius=checks.real("radius", self.radius, above=0, high=_FAR, unit="m"),
         )
 
     def signed_distance(self, points: np.ndarray) -> np.ndarray:
@@ -88,9 +95,9 @@ class Cylinder(Obstacle):
     def __post_init__(self) -> None:
         super().__post_init__()
         self._set(
-            point=checks.vector("point", self.point, 3, unit="m"),
+            point=checks.vector("point", self.point, 3, unit="m", largest=_FAR),
             axis=checks.direction("axis", self.axis),
-            radius=checks.real("radius", self.radius, above=0, unit="m"),
+            radius=checks.real("radius", self.radius, above=0, high=_FAR, unit="m"),
         )
 
     def _across(self) -> np.ndarray:
@@ -117,7 +124,7 @@ class Plane(Obstacle):
     def __post_init__(self) -> None:
         super().__post_init__()
         self._set(
-            point=checks.vector("point", self.point, 3, unit="m"),
+            point=checks.vector("point", self.point, 3, unit="m", largest=_FAR),
             normal=checks.direction("normal", self.normal),
         )
 
@@ -146,29 +153,33 @@ class Box(Obstacle):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        size = checks.vector("size", self.size, 3, unit="m")
+        size = checks.vector("size", self.size, 3, unit="m", largest=_FAR)
         for i, side in enumerate(size):
             checks.real(f"size[{i}]", float(side), above=0, unit="m")
         shortest = float(size.min())
         edge = min(0.05 * shortest, 0.001) if self.edge_radius is None else self.edge_radius
         self._set(
-            center=checks.vector("center", self.center, 3, unit="m"),
+            center=checks.vector("center", self.center, 3, unit="m", largest=_FAR),
             size=size,
             orientation=checks.quaternion("orientation", self.orientation),
             edge_radius=checks.real("edge_radius", edge, above=0, high=shortest / 2, unit="m"),
         )
 
+    @property
+    def _edge(self) -> float:
+        return cast(float, self.edge_radius)  # set by __post_init__
+
     def _local(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Rotation, points in the box's frame, and their excess over the core (the box less its rounding)."""
+        """Rotation, points in the box's frame, their excess over the core (box less rounding)."""
         rotation = matrix_from_quaternion(self.orientation)
         local = (points - self.center) @ rotation
-        return rotation, local, np.abs(local) - (self.size / 2 - self.edge_radius)
+        return rotation, local, np.abs(local) - (self.size / 2 - self._edge)
 
     def signed_distance(self, points: np.ndarray) -> np.ndarray:
         _, _, excess = self._local(points)
         outside = np.linalg.norm(np.maximum(excess, 0.0), axis=1)
         inside = np.minimum(excess.max(axis=1), 0.0)
-        return outside + inside - self.edge_radius
+        return outside + inside - self._edge
 
     def derivatives(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         rotation, local, excess = self._local(points)
@@ -186,4 +197,6 @@ class Box(Obstacle):
 
     def moved(self, pose: Pose) -> Box:
         turned = pose.rotation @ matrix_from_quaternion(self.orientation)
-        return replace(self, center=pose.points(self.center), orientation=quaternion_from_matrix(turned))
+        return replace(
+            self, center=pose.points(self.center), orientation=quaternion_from_matrix(turned)
+        )

@@ -29,19 +29,22 @@ class Walk(Protocol):
     late: bool
 
 
-def smallest_reduced_eigenvalue(point: KktPoint) -> float:
-    """Smallest eigenvalue of the Hessian on the null space of the active constraints.
+def softest_direction(point: KktPoint) -> tuple[float, np.ndarray]:
+    """Smallest eigenvalue of the Hessian on the null space of the active constraints, its vector (N,).
 
     In the scaled coordinates, where the elastic energy is 1/2 y.y: relative to the free rod's own
     stiffness.
     """
+    null = _null_space(point)
+    values, vectors = np.linalg.eigh(null.T @ point.hessian @ null)
+    return float(values[0]), null @ vectors[:, 0]
+
+
+def _null_space(point: KktPoint) -> np.ndarray:
     rows = point.rows[point.active]
-    hessian = point.hessian
-    if len(rows):
-        q, _ = np.linalg.qr(rows.T, mode="complete")
-        null = q[:, len(rows) :]
-        hessian = null.T @ hessian @ null
-    return float(np.linalg.eigvalsh(hessian)[0]) if len(hessian) else 1.0
+    if not len(rows):
+        return np.eye(len(point.hessian))
+    return np.linalg.qr(rows.T, mode="complete")[0][:, len(rows) :]
 
 
 def make_solution(
@@ -54,7 +57,8 @@ def make_solution(
     disks = np.arange(finger.segments + 1) * problem.settings.arcs_per_segment
     # The base end of a cable is where its tension is felt (all spans alike when frictionless).
     base_group = np.array([np.flatnonzero(problem.group_cable == j)[0] for j in range(len(finger.cables))])
-    eigenvalue = smallest_reduced_eigenvalue(point)
+    null = _null_space(point)
+    eigenvalue = float(np.linalg.eigvalsh(null.T @ point.hessian @ null)[0])
     z = at.z / problem.rod_step
     arcs = (finger.segments, problem.settings.arcs_per_segment, problem.settings.curvature_order + 1, 3)
     metres = at.points * length

@@ -77,7 +77,9 @@ class Pose:
     orientation: np.ndarray = field(default_factory=lambda: np.array([0.0, 0.0, 0.0, 1.0]))
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "position", checks.vector("position", self.position, 3, unit="m"))
+        object.__setattr__(
+            self, "position", checks.vector("position", self.position, 3, unit="m", largest=1e6)
+        )
         object.__setattr__(self, "orientation", checks.quaternion("orientation", self.orientation))
 
     @property

@@ -13,14 +13,14 @@ from .equilibrium import EquilibriumProblem
 from .errors import InvalidValue
 from .finger import Finger
 from .obstacles import Obstacle
-from .result import make_solution, meeting_disks
+from .result import make_solution, meeting_disks, softest_direction
 from .sensitivity import Sensitivity, sensitivity
 from .settings import SolverSettings
 from .solution import Solution
 from .sqp import Bounds, KktPoint, derive, solve_sqp
 
 _SMALLEST_STEP = 1.0 / 512  # of the way to the target
-_NUDGE = 1e-2  # departure from a pose at which symmetry leaves the QP without a solution
+_NUDGE = 3e-2  # departure from a saddle, in the coordinates of which energy is 1/2 y.y
 
 
 class FingerSolver:
@@ -186,38 +186,52 @@ class _Walk:
         # A step that moves the finger more than this, per change, is suspected of a jump. Bending
         # moves the tip by up to about L / (2 a) per pull.
         gain = 3.0 * problem.finger.length / problem.finger.disk_radius
-        done, size, nudged = 0.0, largest, False
+        done, size, patience = 0.0, largest, settings.max_iterations
         while done < 1.0:
+            if self._is_late():
+                self.reached = done
+                return
             fraction = 1.0 if done + size > 1.0 - 1e-9 else done + size
             pulls = start + fraction * (target - start)
             bounds = Bounds(problem.length_bounds(pulls), (1.0 - fraction) * inside)
-            result = solve_sqp(problem, self.point, bounds)
+            result = solve_sqp(problem, self.point, bounds, patience)
             self.iterations += result.iterations
             self.met = meeting_disks(problem, result.point) if result.converged else None
             good = result.converged and self.met is None
             suspect = good and watched and self._moved(result.point) > 1e-3 + gain * size * change
-            self.late = time.perf_counter() > self._deadline
-            if (suspect or not good) and size > _SMALLEST_STEP and not self.late:
-                size *= 0.5
-                continue
-            if not good and not nudged and not self.late and self.met is None:
-                self._nudge()
-                nudged, size = True, largest
-                continue
+            leaving = patience > settings.max_iterations
+            if (suspect or not good) and not leaving:
+                if size > _SMALLEST_STEP and not self._at_saddle():
+                    size *= 0.5
+                    continue
+                if not good and self.met is None:
+                    # A saddle, or a symmetry that leaves the QP no solution: go off it.
+                    self._nudge()
+                    size, patience = largest, 4 * settings.max_iterations
+                    continue
             if not good:
                 self.reached = done
                 return
-            self.jumped |= suspect or (nudged and fraction == 1.0)
+            self.jumped |= suspect or leaving
             self.substeps += 1
             self.point, self.pulls, done = result.point, pulls, fraction
+            patience = settings.max_iterations
             size = min(largest, size * (2.0 if result.iterations <= 5 else 1.0))
         self.pulls = target
 
+    def _is_late(self) -> bool:
+        self.late = time.perf_counter() > self._deadline
+        return self.late
+
+    def _at_saddle(self) -> bool:
+        return softest_direction(self.point)[0] < 0.0
+
     def _nudge(self) -> None:
-        """Leave a pose whose symmetry makes a constraint's gradient vanish (a tip pressed head-on)."""
-        point = self.point
-        y = point.at.y + _NUDGE * np.cos(np.arange(self.problem.size))
-        self.point = derive(self.problem, self.problem.evaluate(y), point.tensions, point.forces)
+        """Depart from the point along its softest direction, whose sign is chosen once for all."""
+        point, (_, way) = self.point, softest_direction(self.point)
+        way = way * np.sign(way[np.argmax(np.abs(way))])
+        at = self.problem.evaluate(point.at.y + _NUDGE * way)
+        self.point = derive(self.problem, at, point.tensions, point.forces)
 
     def _moved(self, point: KktPoint) -> float:
         """Farthest way of a disk centre from the last point (units of L)."""

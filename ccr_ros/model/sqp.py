@@ -79,11 +79,13 @@ class SqpResult:
     converged: bool
 
 
-def solve_sqp(problem: EquilibriumProblem, point: KktPoint, bounds: Bounds) -> SqpResult:
+def solve_sqp(
+    problem: EquilibriumProblem, point: KktPoint, bounds: Bounds, max_iterations: int
+) -> SqpResult:
     """Minimise the energy within bounds, starting from ``point``."""
     settings = problem.settings
     price, best = 10.0, np.inf
-    for iteration in range(settings.max_iterations):
+    for iteration in range(max_iterations):
         slacks = point.slacks(bounds)
         violation = _violation(point, slacks)
         error = point.residual + violation
@@ -100,7 +102,7 @@ def solve_sqp(problem: EquilibriumProblem, point: KktPoint, bounds: Bounds) -> S
         best = min(best, error)
         at = _line_search(problem, point, step, bounds, price, newton)
         point = derive(problem, at, *_scatter(point, multipliers))
-    return SqpResult(point, settings.max_iterations, False)
+    return SqpResult(point, max_iterations, False)
 
 
 def derive(
