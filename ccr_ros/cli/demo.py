@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Three fingers move on a ROS graph: the solver node and a publisher of cable pulls, as processes
+of their own, in a ROS domain of their own (unless ROS_DOMAIN_ID is set). They close on a ball and
+open again, one of them in its own rhythm.
+
+It leaves, in DIR: replay.html (open it in a browser), strip.png and recording.json; and prints what
+was measured. Exit code: 0 done, 1 a process failed, 2 bad input.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import webbrowser
+from pathlib import Path
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    parser.add_argument("--out", metavar="DIR", default="demo", help="folder (default: demo)")
+    parser.add_argument(
+        "--seconds", metavar="S", default="18", help="how long the fingers move (default: 18)"
+    )
+    parser.add_argument(
+        "--headless",
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help="--no-headless: open the replay in a browser at the end",
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the demo and return the exit code.
+
+    Raises:
+        InvalidFile, InvalidValue: The folder cannot be written to, or the time is out of range.
+    """
+    # Here, so that `ccr demo --help` stays quick.
+    from ccr_ros.demo.processes import DemoFailed
+    from ccr_ros.demo.progress import Progress
+    from ccr_ros.demo.session import run_demo
+
+    progress = Progress(sys.stdout)
+    try:
+        paths = run_demo(Path(args.out), _number(args.seconds), progress)
+    except DemoFailed as error:
+        progress.clear()
+        print(f"ccr: error: {error}", file=sys.stderr)
+        return 1
+    except BaseException:
+        progress.clear()
+        raise
+    print("look at:")
+    for path in paths:
+        print(f"  {path}")
+    replay = next(path for path in paths if path.suffix == ".html")
+    if not args.headless and not webbrowser.open(replay.resolve().as_uri()):
+        print(f"no browser could be opened; open {replay} yourself")
+    return 0
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        from ccr_ros.model import InvalidValue
+
+        raise InvalidValue("--seconds", text, "a number of seconds") from None

@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Gives every test process its own ROS graph, and rclpy, before any test module is imported."""
+
+import os
+import random
+import socket
+
+from hypothesis import settings
+
+from ccr_ros.runtime import enable_ros
+
+# The same examples on every machine, however slow it is.
+settings.register_profile("ccr", derandomize=True, deadline=None, max_examples=25)
+settings.load_profile("ccr")
+
+DOMAINS = range(1, 101)  # the ports of higher ones reach into the ephemeral range
+
+
+def _free(domain: int) -> bool:
+    """Tell whether no participant uses the domain on this machine (DDS-RTPS 9.6.2: its port)."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.bind(("127.0.0.1", 7400 + 250 * domain + 10))
+        except OSError:
+            return False
+    return True
+
+
+def _own_domain() -> int:
+    """Return a domain no other worker of this run takes, and that is free on this machine."""
+    worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
+    workers = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
+    mine = [domain for domain in DOMAINS if domain % workers == worker % workers]
+    random.shuffle(mine)
+    return next(domain for domain in mine if _free(domain))
+
+
+os.environ["ROS_DOMAIN_ID"] = str(_own_domain())
+os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+os.environ["ROS_PYTHON_CHECK_FIELDS"] = "1"  # real rclpy checks no field types by default
+enable_ros()
