@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The rows as a table for people."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from .measure import Row
+from .suites import GROUPS
+
+Column = tuple[str, Callable[[Row], str]]
+
+
+def _number(value: float | None, pattern: str) -> str:
+    return "-" if value is None else format(value, pattern)
+
+
+def _times(value: float | None) -> str:
+    """A ratio with three digits that matter, e.g. 0.0123x or 124x."""
+    if value is None:
+        return "-"
+    return f"{value:.0f}x" if value >= 100 else f"{value:#.3g}x"
+
+
+def _error(row: Row) -> str:
+    mark = "*" if row.rms_against == "ccr_ros" else ""
+    return _number(row.rms_mm, ".5f") + mark
+
+
+TIMED: tuple[Column, ...] = (
+    ("solver", lambda r: r.name),
+    ("p50 ms", lambda r: _number(r.p50_ms, ".2f")),
+    ("p99 ms", lambda r: _number(r.p99_ms, ".2f")),
+    ("cpu ms", lambda r: _number(r.cpu_ms, ".2f")),
+    ("p50 ratio", lambda r: _times(r.ratio)),
+    ("cpu ratio", lambda r: _times(r.cpu_ratio)),
+    ("RMS mm", _error),
+    ("RMS %", lambda r: _number(r.rms_percent, ".5f")),
+    ("RMS ratio", lambda r: _times(r.rms_ratio)),
+    ("iter.", lambda r: _number(r.iterations, ".0f")),
+    ("build ms", lambda r: _number(r.build_ms, ".0f")),
+    ("note", lambda r: r.note),
+)
+MEMORY: tuple[Column, ...] = (
+    ("solver", lambda r: r.name),
+    ("memory MB", lambda r: _number(r.memory_mb, ".1f")),
+    ("ratio", lambda r: _times(r.ratio)),
+    ("note", lambda r: r.note),
+)
+TEXT = {"solver", "note"}  # left-aligned
+
+
+def table(rows: Sequence[Row]) -> str:
+    """Return all rows as text, by group, then by case and number of segments."""
+    parts = []
+    for group, title in GROUPS.items():
+        members = [row for row in rows if row.group == group]
+        if members:
+            baselines = " or ".join(dict.fromkeys(f"{row.baseline!r}" for row in members))
+            parts.append(f"{title}\n{'=' * len(title)}\nratios are to {baselines}\n")
+            parts.append(_group(members, MEMORY if group == "memory" else TIMED))
+    parts.append(
+        "Lower is better in every column. p50, p99: wall time of one warm step, single-threaded;\n"
+        "cpu: median CPU time of a step, which other programs on the machine disturb less.\n"
+        "RMS: over disk centres at the end of the sweep, against the independent reference rod\n"
+        "(% of the finger's length); with *, against ccr_ros: the reference has other disks.\n"
+        "iter.: median per step."
+    )
+    return "\n".join(parts)
+
+
+def _group(rows: Sequence[Row], columns: Sequence[Column]) -> str:
+    cells = [[text(row) for _, text in columns] for row in rows]
+    heads = [head for head, _ in columns]
+    widths = [max(len(c) for c in column) for column in zip(heads, *cells, strict=True)]
+
+    def line(values: Sequence[str]) -> str:
+        aligned = (
+            value.ljust(width) if head in TEXT else value.rjust(width)
+            for value, width, head in zip(values, widths, heads, strict=True)
+        )
+        return "  " + "  ".join(aligned).rstrip()
+
+    lines = [line(heads)]
+    last = None
+    for row, values in zip(rows, cells, strict=True):
+        if (row.case, row.n) != last:
+            last = (row.case, row.n)
+            lines.append(f"{row.case}, n = {row.n}{', contact' if row.contact else ''}")
+        lines.append(line(values))
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,340 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A recorded run of a gripper: what stood where, and how the fingers moved over time.
+
+Frames: whatever belongs to a finger (backbone, orientations, cables, contacts) is in that finger's
+base frame, as a `Solution` is; the bases and the objects are in the gripper's frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from ..model import checks
+from ..model.errors import InvalidValue, UnknownName
+from ..model.obstacles import Box, Cylinder, Obstacle, Plane, Sphere
+from ..model.rotation import Pose, quaternion_from_matrix
+from ..model.solution import Contact
+
+FORCES_ARE = ("newton", "per_EI")
+CONTACT_POINTS = ("backbone", "cable", "antagonist")
+DIMENSIONS = {"sphere": ("radius",), "box": ("x", "y", "z"), "cylinder": ("height", "radius")}
+
+
+@dataclass(frozen=True, eq=False)
+class SolidObject:
+    """A primitive body in the gripper's frame, with the dimensions of shape_msgs/SolidPrimitive.
+
+    Attributes:
+        name: Unique in its recording.
+        kind: ``"sphere"``, ``"box"`` or ``"cylinder"``.
+        dimensions: [m]: sphere (radius,); box (x, y, z) full sizes; cylinder (height, radius), its
+            axis along z.
+        pose: Of the body's centre in the gripper's frame.
+    """
+
+    name: str
+    kind: str
+    dimensions: tuple[float, ...]
+    pose: Pose = field(default_factory=Pose)
+
+    def __post_init__(self) -> None:
+        label("name", self.name)
+        if self.kind not in DIMENSIONS:
+            raise InvalidValue("kind", self.kind, f"one of {', '.join(DIMENSIONS)}")
+        names = DIMENSIONS[self.kind]
+        sizes = checks.vector("dimensions", self.dimensions, len(names), unit="m")
+        for name, size in zip(names, sizes, strict=True):
+            checks.real(f"dimensions.{name}", float(size), above=0, unit="m")
+        object.__setattr__(self, "dimensions", tuple(sizes.tolist()))
+
+    @classmethod
+    def from_obstacle(
+        cls, obstacle: Obstacle, base: Pose | None = None, extent: float = 0.3
+    ) -> SolidObject:
+        """Make the body that shows an obstacle.
+
+        Args:
+            obstacle: In the frame whose pose in the gripper is ``base``.
+            base: Pose of the obstacle's frame; default: the gripper's own.
+            extent: How much of an infinite cylinder or of a plane is shown [m].
+        """
+        body = obstacle.moved(base) if base is not None else obstacle
+        if isinstance(body, Sphere):
+            return cls(body.name, "sphere", (body.radius,), Pose(body.center))
+        if isinstance(body, Box):
+            return cls(body.name, "box", tuple(body.size), Pose(body.center, body.orientation))
+        if isinstance(body, Cylinder):
+            return cls(
+                body.name, "cylinder", (extent, body.radius), Pose(body.point, _along(body.axis))
+            )
+        if isinstance(body, Plane):
+            thickness = extent / 100
+            center = body.point - body.normal * thickness / 2
+            return cls(
+                body.name, "box", (extent, extent, thickness), Pose(center, _along(body.normal))
+            )
+        raise InvalidValue("obstacle", type(obstacle).__name__, "a Sphere, Box, Cylinder or Plane")
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedFinger:
+    """What stays the same of one finger during a recording.
+
+    Attributes:
+        name: Unique in its recording.
+        base: Pose of the finger's base in the gripper's frame.
+        disk_radius: [m].
+        cables: Names of the cables, in the order of pulls and tensions.
+        backbone_diameter: [m].
+        rest_lengths: (m,) cable lengths at rest [m], which percentages refer to; may be empty.
+    """
+
+    name: str
+    base: Pose
+    disk_radius: float
+    cables: tuple[str, ...]
+    backbone_diameter: float = 0.0025
+    rest_lengths: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        label("name", self.name)
+        checks.real("disk_radius", self.disk_radius, above=0, unit="m")
+        checks.real("backbone_diameter", self.backbone_diameter, above=0, unit="m")
+        cables = tuple(label(f"cables[{i}]", c) for i, c in enumerate(self.cables))
+        if not cables or len(set(cables)) != len(cables):
+            raise InvalidValue(
+                "cables", cables, "a list of at least one cable name, without duplicates"
+            )
+        if len(self.rest_lengths) not in (0, len(cables)):
+            raise InvalidValue(
+                "rest_lengths", self.rest_lengths, f"empty or {len(cables)} lengths [m]"
+            )
+        lengths = tuple(
+            checks.real(f"rest_lengths[{i}]", v, above=0, unit="m")
+            for i, v in enumerate(self.rest_lengths)
+        )
+        object.__setattr__(self, "cables", cables)
+        object.__setattr__(self, "rest_lengths", lengths)
+
+
+@dataclass(frozen=True, eq=False)
+class FingerFrame:
+    """One finger at one moment, in its base frame.
+
+    Attributes:
+        pulls: (m,) [m].
+        tensions: (m,) >= 0 [N, or 1/m^2 per EI].
+        backbone: (n+1, 3) disk centres, base to tip [m].
+        orientations: (n+1, 4) disk orientations (x, y, z, w), z along the backbone.
+        cables: Cable points {name: (k+1, 3)} [m]; a cable that was not received may be absent.
+        contacts: The active contacts.
+        converged, stable: What the solver's certificate says.
+        stale: The pose is older than the pulls: it is the last good one.
+    """
+
+    pulls: np.ndarray
+    tensions: np.ndarray
+    backbone: np.ndarray
+    orientations: np.ndarray
+    cables: Mapping[str, np.ndarray] = field(default_factory=dict)
+    contacts: tuple[Contact, ...] = ()
+    converged: bool = True
+    stable: bool = True
+    stale: bool = False
+
+    def __post_init__(self) -> None:
+        pulls = array("pulls", self.pulls, (None,), "m")
+        tensions = array("tensions", self.tensions, (len(pulls),))
+        if np.any(tensions < 0):
+            worst = int(np.argmin(tensions))
+            raise InvalidValue(f"tensions[{worst}]", float(tensions[worst]), "a finite number >= 0")
+        backbone = array("backbone", self.backbone, (None, 3), "m")
+        if len(backbone) < 2:
+            raise InvalidValue("backbone", len(backbone), "at least 2 disk centres, base to tip")
+        turns = array("orientations", self.orientations, (len(backbone), 4))
+        norms = np.linalg.norm(turns, axis=1, keepdims=True)
+        if np.any(np.abs(norms - 1.0) > 0.01):
+            worst = int(np.argmax(np.abs(norms - 1.0)))
+            raise InvalidValue(f"orientations[{worst}]", turns[worst].tolist(), "a unit quaternion")
+        turns = turns / norms
+        turns.setflags(write=False)
+        cables = {n: array(f"cables.{n}", p, (None, 3), "m") for n, p in dict(self.cables).items()}
+        contacts = tuple(
+            _contact(f"contacts[{i}]", c, len(backbone) - 1) for i, c in enumerate(self.contacts)
+        )
+        values = {"pulls": pulls, "tensions": tensions, "backbone": backbone, "orientations": turns}
+        values |= {"cables": MappingProxyType(cables), "contacts": contacts}
+        for key, value in values.items():
+            object.__setattr__(self, key, value)
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """The gripper at one moment.
+
+    Attributes:
+        time: Since the start of the recording [s].
+        fingers: By name; a finger that had not been heard of yet is absent.
+        objects: Pose of each object present, by name; ``None``: all, at their recorded poses.
+    """
+
+    time: float
+    fingers: Mapping[str, FingerFrame]
+    objects: Mapping[str, Pose] | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "time", checks.real("time", self.time, low=0, unit="s"))
+        object.__setattr__(self, "fingers", MappingProxyType(dict(self.fingers)))
+        if self.objects is not None:
+            object.__setattr__(self, "objects", MappingProxyType(dict(self.objects)))
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """A run of a gripper.
+
+    Attributes:
+        gripper: Name of the gripper.
+        fingers: What stays the same, per finger.
+        frames: At least one, times strictly increasing.
+        objects: Every object that appears.
+        forces_are: ``"newton"`` or ``"per_EI"`` [1/m^2]: unit of tensions and contact forces.
+
+    Raises:
+        InvalidValue: A value is out of range or does not fit the others; says which and where.
+        UnknownName: A frame names a finger, cable or object that the recording does not have.
+    """
+
+    gripper: str
+    fingers: tuple[RecordedFinger, ...]
+    frames: tuple[Frame, ...]
+    objects: tuple[SolidObject, ...] = ()
+    forces_are: str = "newton"
+
+    def __post_init__(self) -> None:
+        label("gripper", self.gripper)
+        if self.forces_are not in FORCES_ARE:
+            raise InvalidValue("forces_are", self.forces_are, f"one of {', '.join(FORCES_ARE)}")
+        for kind in ("fingers", "frames", "objects"):
+            object.__setattr__(self, kind, tuple(getattr(self, kind)))
+        if not self.fingers:
+            raise InvalidValue("fingers", (), "at least one finger")
+        if not self.frames:
+            raise InvalidValue("frames", (), "at least one frame (was nothing received?)")
+        _unique("fingers", [f.name for f in self.fingers])
+        _unique("objects", [o.name for o in self.objects])
+        last = -1.0
+        for i, frame in enumerate(self.frames):
+            if frame.time <= last:
+                raise InvalidValue(
+                    f"frames[{i}].time", frame.time, f"later than the frame before ({last} s)"
+                )
+            last = frame.time
+            self._check_frame(f"frames[{i}]", frame)
+
+    def _check_frame(self, place: str, frame: Frame) -> None:
+        known = {f.name: f for f in self.fingers}
+        for name, moment in frame.fingers.items():
+            if name not in known:
+                raise UnknownName("finger", name, known)
+            finger, where = known[name], f"{place}.fingers.{name}"
+            if len(moment.pulls) != len(finger.cables):
+                raise InvalidValue(
+                    f"{where}.pulls", moment.pulls.tolist(), f"{len(finger.cables)} numbers"
+                )
+            for cable, points in moment.cables.items():
+                if cable not in finger.cables:
+                    raise UnknownName("cable", cable, finger.cables)
+                if not 2 <= len(points) <= len(moment.backbone):
+                    raise InvalidValue(
+                        f"{where}.cables.{cable}",
+                        len(points),
+                        f"2..{len(moment.backbone)} points, one per disk from the base on",
+                    )
+        for name in frame.objects or ():
+            if name not in {o.name for o in self.objects}:
+                raise UnknownName("object", name, [o.name for o in self.objects])
+
+    @property
+    def duration(self) -> float:
+        """Time of the last frame [s]."""
+        return self.frames[-1].time
+
+    def finger(self, name: str) -> RecordedFinger:
+        """Return the finger of that name.
+
+        Raises:
+            UnknownName: There is none.
+        """
+        for finger in self.fingers:
+            if finger.name == name:
+                return finger
+        raise UnknownName("finger", name, [f.name for f in self.fingers])
+
+    def objects_at(self, frame: Frame) -> tuple[SolidObject, ...]:
+        """Return the objects present in a frame, at their poses there."""
+        if frame.objects is None:
+            return self.objects
+        return tuple(
+            SolidObject(o.name, o.kind, o.dimensions, frame.objects[o.name])
+            for o in self.objects
+            if o.name in frame.objects
+        )
+
+
+def label(place: str, value: Any) -> str:
+    """Return ``value`` as a name to show: any text that is not empty."""
+    if not isinstance(value, str) or not value.strip():
+        raise InvalidValue(place, value, "a text that is not empty")
+    return value
+
+
+def array(place: str, value: Any, shape: tuple[int | None, ...], unit: str = "") -> np.ndarray:
+    """Return a read-only finite float copy of the given shape; ``None`` stands for any length."""
+    words = " x ".join("any" if s is None else str(s) for s in shape)
+    allowed = f"finite numbers of shape {words}" + (f" [{unit}]" if unit else "")
+    try:
+        out = np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        raise InvalidValue(place, value, allowed) from None
+    if out.ndim != len(shape) or any(
+        s not in (None, n) for s, n in zip(shape, out.shape, strict=True)
+    ):
+        raise InvalidValue(place, f"shape {out.shape}", allowed)
+    if not np.isfinite(out).all():
+        raise InvalidValue(place, float(out[~np.isfinite(out)][0]), allowed)
+    out.setflags(write=False)
+    return out
+
+
+def _contact(place: str, contact: Contact, last_disk: int) -> Contact:
+    if contact.point not in CONTACT_POINTS:
+        raise InvalidValue(f"{place}.point", contact.point, f"one of {', '.join(CONTACT_POINTS)}")
+    return Contact(
+        disk=checks.integer(f"{place}.disk", contact.disk, low=0, high=last_disk),
+        point=contact.point,
+        cable=str(contact.cable),
+        obstacle=str(contact.obstacle),
+        position=array(f"{place}.position", contact.position, (3,), "m"),
+        normal=checks.direction(f"{place}.normal", contact.normal),
+        force=checks.real(f"{place}.force", contact.force, low=0),
+    )
+
+
+def _unique(place: str, names: list[str]) -> None:
+    for i, name in enumerate(names):
+        if name in names[:i]:
+            raise InvalidValue(f"{place}[{i}].name", name, "unique in its recording")
+
+
+def _along(axis: np.ndarray) -> np.ndarray:
+    """Quaternion of a frame whose z is the given unit vector."""
+    side = np.eye(3)[int(np.argmin(np.abs(axis)))]
+    x = np.cross(side, axis)
+    x /= np.linalg.norm(x)
+    return quaternion_from_matrix(np.column_stack([x, np.cross(axis, x), axis]))

@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A recording as one picture: the gripper at some moments, and pulls and tensions over time."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..model import checks
+from .figures import MM, checked_path, force_unit, new_figure, save
+from .recording import Frame, Recording
+from .sketch import View, bounds, cable_color, draw_moment, draw_plate
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_DASHES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (1.5, 1.5)), (0, (6, 2, 1.5, 2)))
+
+
+def write_strip(recording: Recording, path: str | Path, count: int = 5) -> Path:
+    """Draw the strip of a recording to a PNG (or SVG, PDF) file and return its path.
+
+    Args:
+        recording: The recording.
+        path: The file; its directory must exist.
+        count: Number of moments shown, 1..12; see `moments`.
+
+    Raises:
+        InvalidValue: A wrong count, or a path that does not end in a known picture format.
+        InvalidFile: The file cannot be written.
+        MissingMatplotlib: matplotlib is not installed.
+    """
+    out = checked_path(path)
+    return save(figure_of_recording(recording, count), out, dpi=120)
+
+
+def moments(recording: Recording, count: int) -> tuple[int, ...]:
+    """Return indices of at most ``count`` frames to show: first, last, and where most happens.
+
+    They part the run into pieces of equal change, half of it time and half of it pulls, so that
+    closing and opening are shown more finely than waiting.
+    """
+    checks.integer("count", count, low=1, high=12)
+    frames = recording.frames
+    if count == 1 or len(frames) == 1:
+        return (0,)
+    times = np.array([f.time for f in frames])
+    change = np.array([0.0] + [_change(a, b) for a, b in pairwise(frames)])
+    progress = (times - times[0]) / (times[-1] - times[0])
+    if change.sum() > 0:
+        progress = (progress + np.cumsum(change) / change.sum()) / 2
+    marks = np.linspace(0, 1, count)
+    return tuple(dict.fromkeys(int(np.argmin(np.abs(progress - m))) for m in marks))
+
+
+def figure_of_recording(recording: Recording, count: int = 5) -> Figure:
+    """Return the figure that `write_strip` writes; axes "t=...", then axes "tension" and "pull"."""
+    shown = moments(recording, count)
+    view = View()
+    low, high = bounds(recording, view)
+    middle, half = (low + high) / 2, (high - low) / 2 + 12.0  # mm of air, and room for force arrows
+    width = max(10.0, 2.9 * len(shown))
+    panel = 0.925 * width / len(shown) * half[1] / half[0]
+    panel = min(max(panel, 2.0), 5.0)
+    height = panel + 4.9
+    figure = new_figure(width, height)
+    grid = figure.add_gridspec(
+        3, len(shown), height_ratios=(panel, 1.5, 1.5), left=0.06, right=0.985,
+        top=1 - 0.95 / height, bottom=0.85 / height, hspace=0.1, wspace=0.0,
+    )  # fmt: skip
+    figure.text(
+        0.15 / width,
+        1 - 0.36 / height,
+        recording.gripper,
+        fontsize=15,
+        fontweight="bold",
+        color="#18212e",
+    )
+    for column, index in enumerate(shown):
+        frame = recording.frames[index]
+        axes = figure.add_subplot(grid[0, column], label=f"t={frame.time:.2f}")
+        draw_plate(axes, recording, view)
+        draw_moment(axes, recording, frame, view)
+        axes.set_aspect("equal", adjustable="box", anchor="S")
+        axes.set_xlim(middle[0] - half[0], middle[0] + half[0])
+        axes.set_ylim(middle[1] - half[1], middle[1] + half[1])
+        axes.set_axis_off()
+        axes.set_title(f"{frame.time:.1f} s\n{_state(frame)}", fontsize=10, color="#18212e")
+    unit = force_unit(recording.forces_are)
+    tension = figure.add_subplot(grid[1, :], label="tension")
+    _curves(tension, recording, shown, lambda f, j: float(f.tensions[j]), f"tension [{unit}]")
+    pull = figure.add_subplot(grid[2, :], label="pull", sharex=tension)
+    _curves(pull, recording, shown, lambda f, j: float(f.pulls[j]) * MM, "pull [mm]")
+    pull.set_xlabel("time [s]", fontsize=9)
+    tension.tick_params(labelbottom=False)
+    handles, labels = tension.get_legend_handles_labels()
+    figure.legend(
+        handles, labels, loc="lower center", ncols=min(6, len(labels)), fontsize=9, frameon=False
+    )
+    return figure
+
+
+def _change(a: Frame, b: Frame) -> float:
+    """How much the pulls changed [m], summed over fingers that are in both frames."""
+    names = a.fingers.keys() & b.fingers.keys()
+    return float(sum(np.abs(b.fingers[n].pulls - a.fingers[n].pulls).sum() for n in names))
+
+
+def _state(frame: Frame) -> str:
+    contacts = sum(len(f.contacts) for f in frame.fingers.values())
+    bad = [n for n, f in frame.fingers.items() if not f.converged or f.stale]
+    words = [f"{contacts} contact{'' if contacts == 1 else 's'}" if contacts else "no contact"]
+    words += [f"not converged: {', '.join(bad)}"] if bad else []
+    return ", ".join(words)
+
+
+def _curves(
+    axes: Any, recording: Recording, shown: tuple[int, ...], value: Any, label: str
+) -> None:
+    fingers, last = recording.fingers, len(recording.fingers) - 1
+    for k, finger in enumerate(fingers):
+        frames = [f for f in recording.frames if finger.name in f.fingers]
+        times = [f.time for f in frames]
+        for j, cable in enumerate(finger.cables):
+            axes.plot(
+                times,
+                [value(f.fingers[finger.name], j) for f in frames],
+                color=cable_color(k, j, len(fingers)),
+                ls=_DASHES[j % len(_DASHES)] if last else "-",
+                # Fingers often do the same: the first drawn are the widest, so that all show.
+                lw=1.2 + (1.6 * (last - k) if last < 4 else 0),
+                label=f"{finger.name} {cable}",
+            )
+    for index in shown:
+        axes.axvline(
+            recording.frames[index].time, color="#18212e", lw=0.8, ls=(0, (2, 2)), alpha=0.5
+        )
+    if len(recording.frames) > 1:
+        axes.set_xlim(recording.frames[0].time, recording.duration)
+    axes.set_ylabel(label, fontsize=9)
+    axes.grid(color="#e3e7ee", linewidth=0.7)
+    axes.tick_params(labelsize=8, colors="#4a5568")
+    for side, edge in axes.spines.items():
+        edge.set_color("#c5ccd6")
+        edge.set_visible(side in ("left", "bottom"))
