@@ -122,7 +122,7 @@ class EquilibriumProblem:
     def __init__(self, finger: Finger, settings: SolverSettings | None = None) -> None:
         self.finger = finger
         self.settings = settings or SolverSettings()
-        k, order = self.settings.arcs_per_segment, self.settings.curvature_order
+        k, order = self.settings.arcs_per_segment, self.settings.order(finger.segments)
         self.arcs = finger.segments * k
         self.rod = Rod(self.arcs, order)
         h = 1.0 / self.arcs

@@ -60,7 +60,7 @@ def make_solution(
     null = _null_space(point)
     eigenvalue = float(np.linalg.eigvalsh(null.T @ point.hessian @ null)[0])
     z = at.z / problem.rod_step
-    arcs = (finger.segments, problem.settings.arcs_per_segment, problem.settings.curvature_order + 1, 3)
+    arcs = (finger.segments, problem.settings.arcs_per_segment, problem.rod.order + 1, 3)
     metres = at.points * length
     names = finger.cable_names
     cable_error, penetration = _errors(problem, point, walk.pulls)
