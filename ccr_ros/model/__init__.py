@@ -6,8 +6,8 @@ from .files import Gripper, MountedFinger, finger_from_dict, load_finger, load_g
 from .finger import Cable, Finger
 from .obstacles import Box, Cylinder, Obstacle, Plane, Sphere
 from .rotation import Pose
-from .settings import SolverSettings
 from .sensitivity import Sensitivity
+from .settings import SolverSettings
 from .solution import Certificate, Contact, Solution
 from .solver import FingerSolver, solve
 

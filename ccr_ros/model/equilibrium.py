@@ -65,7 +65,10 @@ class Points:
                 return len(offsets) - 1
 
             backbone.append(index(PointLabel(disk, "backbone", ""), np.zeros(3)))
-            for kind, sign, table in (("cable", 1, self.cable), ("antagonist", -1, self.antagonist)):
+            for kind, sign, table in (
+                ("cable", 1, self.cable),
+                ("antagonist", -1, self.antagonist),
+            ):
                 for j, cable in enumerate(finger.cables):
                     if disk <= cable.last_disk:
                         angle = cable.angles[disk]
@@ -139,13 +142,21 @@ class EquilibriumProblem:
 
         self.points = Points(finger)
         spans = [
-            (j, pts[i], pts[i + 1]) for j, pts in enumerate(self.points.cable) for i in range(len(pts) - 1)
+            (j, pts[i], pts[i + 1])
+            for j, pts in enumerate(self.points.cable)
+            for i in range(len(pts) - 1)
         ]
         self.span_cable = np.array([s[0] for s in spans])
         self._span_start = np.array([s[1] for s in spans])
         self._span_end = np.array([s[2] for s in spans])
-        groups = self.span_cable if self.settings.cable_model == "frictionless" else np.arange(len(spans))
-        self.group_cable = np.array([self.span_cable[groups == g][0] for g in range(groups.max() + 1)])
+        groups = (
+            self.span_cable
+            if self.settings.cable_model == "frictionless"
+            else np.arange(len(spans))
+        )
+        self.group_cable = np.array(
+            [self.span_cable[groups == g][0] for g in range(groups.max() + 1)]
+        )
         self._span_group = groups
         # +1 at a span's end, -1 at its start
         self._incidence = np.zeros((len(spans), len(self.points.disk)))
@@ -244,7 +255,7 @@ class EquilibriumProblem:
         gradient = self._incidence.T @ (tension[:, None] * at.spans)
 
         scale = np.sqrt(np.maximum(tension, 0.0) / np.maximum(at.span_lengths, 1e-12))
-        along = (at.spans[:, None, :] @ first.spans)  # (S, 1, N)
+        along = at.spans[:, None, :] @ first.spans  # (S, 1, N)
         across = (first.spans - at.spans[:, :, None] * along) * scale[:, None, None]
         across = across.reshape(-1, self.size)
         hessian = across.T @ across

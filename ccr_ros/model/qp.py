@@ -16,7 +16,6 @@ from functools import lru_cache
 import casadi as ca
 import numpy as np
 
-
 # T L^2 / EI; a straight finger pulled by 5 % has 25. Beyond this the shift below is what answers,
 # because the constraints contradict each other.
 _LARGEST = 1e8
@@ -64,7 +63,9 @@ def solve_multipliers(s: np.ndarray, t: np.ndarray, active: np.ndarray) -> np.nd
 def _daqp(size: int) -> ca.Function:
     dense = ca.Sparsity.dense(size, size)
     options = {"error_on_fail": False}
-    return ca.conic(f"multipliers_{size}", "daqp", {"h": ca.Sparsity.diag(size), "a": dense}, options)
+    return ca.conic(
+        f"multipliers_{size}", "daqp", {"h": ca.Sparsity.diag(size), "a": dense}, options
+    )
 
 
 def _held(s: np.ndarray, t: np.ndarray, active: np.ndarray) -> np.ndarray | None:

@@ -12,7 +12,6 @@ from .equilibrium import EquilibriumProblem
 from .solution import Certificate, Contact, Solution
 from .sqp import KktPoint
 
-
 _STABLE = 1e-6  # a reduced Hessian with an eigenvalue below this is at a branch point, or past it
 
 
@@ -30,10 +29,10 @@ class Walk(Protocol):
 
 
 def softest_direction(point: KktPoint) -> tuple[float, np.ndarray]:
-    """Smallest eigenvalue of the Hessian on the null space of the active constraints, its vector (N,).
+    """Return the smallest eigenvalue, and its vector (N,), of the reduced Hessian.
 
-    In the scaled coordinates, where the elastic energy is 1/2 y.y: relative to the free rod's own
-    stiffness.
+    Reduced to the null space of the active constraints, in the scaled coordinates in which the
+    elastic energy is 1/2 y.y: relative to the free rod's own stiffness.
     """
     null = _null_space(point)
     values, vectors = np.linalg.eigh(null.T @ point.hessian @ null)
@@ -56,7 +55,9 @@ def make_solution(
     force_unit = finger.bending_stiffness / length**2
     disks = np.arange(finger.segments + 1) * problem.settings.arcs_per_segment
     # The base end of a cable is where its tension is felt (all spans alike when frictionless).
-    base_group = np.array([np.flatnonzero(problem.group_cable == j)[0] for j in range(len(finger.cables))])
+    base_group = np.array(
+        [np.flatnonzero(problem.group_cable == j)[0] for j in range(len(finger.cables))]
+    )
     null = _null_space(point)
     eigenvalue = float(np.linalg.eigvalsh(null.T @ point.hessian @ null)[0])
     z = at.z / problem.rod_step
@@ -156,5 +157,8 @@ def _message(problem: EquilibriumProblem, walk: Walk, stable: bool) -> str:
     if walk.jumped:
         notes.append("the finger snapped to another branch of equilibria on the way")
     if not stable:
-        notes.append("the pose is not a strict minimum of the energy (a saddle or branch point): a disturbance moves it")
+        notes.append(
+            "the pose is not a strict minimum of the energy (a saddle or branch point):"
+            " a disturbance moves it"
+        )
     return "; ".join(notes)

@@ -75,7 +75,9 @@ class _Arc:
             moment[2, 1] - moment[1, 2], moment[0, 2] - moment[2, 0], moment[1, 0] - moment[0, 1]
         )
         trace = ca.trace(moment)
-        turned = (1 - t * self.big_c) * ca.dot(axial, w) + self.big_b * (ca.dot(w, moment @ w) - t * trace)
+        turned = (1 - t * self.big_c) * ca.dot(axial, w) + self.big_b * (
+            ca.dot(w, moment @ w) - t * trace
+        )
         bent = self.big_b * ca.dot(w, ca.cross(v, force))
         bent += self.big_c * (ca.dot(force, w) * ca.dot(w, v) - ca.dot(force, v) * t)
         return trace + turned + ca.dot(force, v) + bent
@@ -111,9 +113,9 @@ class _Buffered:
         self.inputs = [np.zeros(function.nnz_in(i)) for i in range(function.n_in())]
         self.outputs = [np.zeros(function.nnz_out(i)) for i in range(function.n_out())]
         for i, array in enumerate(self.inputs):
-            self._buffer.set_arg(i, memoryview(array))
+            self._buffer.set_arg(i, memoryview(array))  # type: ignore[call-arg]
         for i, array in enumerate(self.outputs):
-            self._buffer.set_res(i, memoryview(array))
+            self._buffer.set_res(i, memoryview(array))  # type: ignore[call-arg]
 
     def __call__(self) -> None:
         self._call()
@@ -217,7 +219,9 @@ class Rod:
         self._second.inputs[2][:] = local.transpose(0, 2, 1).ravel()
         self._second()
         blocks = hessian.reshape(self.arcs, self.size, self.arcs, self.size)
-        blocks[self._diagonal, :, self._diagonal, :] += self._second.outputs[0].reshape(-1, self.size, self.size)
+        blocks[self._diagonal, :, self._diagonal, :] += self._second.outputs[0].reshape(
+            -1, self.size, self.size
+        )
         return hessian
 
 

@@ -34,9 +34,10 @@ class Sensitivity:
 
 def sensitivity(problem: EquilibriumProblem, point: KktPoint) -> Sensitivity:
     """Return the derivatives at a converged point."""
-    finger, count = problem.finger, len(finger.cables)
+    finger = problem.finger
+    count = len(finger.cables)
     zero = problem.length_bounds(np.zeros(count))
-    # bounds are linear in the pulls; in metres of pull
+    # The bounds are linear in the pulls: their derivative, per metre.
     bound = np.column_stack([problem.length_bounds(unit) - zero for unit in np.eye(count)])
     active = np.flatnonzero(point.active)
     groups = len(point.tensions)

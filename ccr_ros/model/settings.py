@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from . import checks
 from .errors import InvalidValue
 
-
 _FINE = 24  # segments; there one constant arc each is off by less than 0.04 % of the length
 
 
@@ -37,7 +36,7 @@ class SolverSettings:
     max_pull_step: float = 0.02
     max_iterations: int = 25
     tolerance: float = 1e-9
-    time_limit: float = 1.0
+    time_limit: float = 2.0
 
     def __post_init__(self) -> None:
         checks.integer("arcs_per_segment", self.arcs_per_segment, low=1, high=64)

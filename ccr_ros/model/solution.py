@@ -57,7 +57,7 @@ class Contact:
 
     Attributes:
         disk: Index of the disk, 0 = base.
-        point: ``"backbone"``, ``"cable"`` or ``"antagonist"`` (the point opposite the cable's hole).
+        point: ``"backbone"``, ``"cable"`` or ``"antagonist"`` (opposite the cable's hole).
         cable: Name of the cable that ``point`` refers to; ``""`` for the backbone.
         obstacle: Name of the obstacle.
         position: (3,) point of contact in the finger's base frame [m].
@@ -138,7 +138,7 @@ class Solution:
         return self
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the solution as plain lists and numbers, ready for JSON (keys as in the README)."""
+        """Return the solution as plain lists and numbers, ready for JSON."""
         c = self.certificate
         return {
             "finger": self.finger.name,

@@ -43,6 +43,9 @@ class FingerSolver:
         self.problem = EquilibriumProblem(finger, settings)
         self.settings = self.problem.settings
         self._solved = False
+        self._obstacles_changed = False
+        self._point: KktPoint
+        self._pulls: np.ndarray
         self._check_clear_of_base(finger.obstacles)
         self.reset()
 
@@ -187,6 +190,7 @@ class _Walk:
         # moves the tip by up to about L / (2 a) per pull.
         gain = 3.0 * problem.finger.length / problem.finger.disk_radius
         done, size, patience = 0.0, largest, settings.max_iterations
+        begin = self.point
         while done < 1.0:
             if self._is_late():
                 self.reached = done
@@ -194,7 +198,7 @@ class _Walk:
             fraction = 1.0 if done + size > 1.0 - 1e-9 else done + size
             pulls = start + fraction * (target - start)
             bounds = Bounds(problem.length_bounds(pulls), (1.0 - fraction) * inside)
-            result = solve_sqp(problem, self.point, bounds, patience)
+            result = solve_sqp(problem, begin, bounds, patience, self._deadline)
             self.iterations += result.iterations
             self.met = meeting_disks(problem, result.point) if result.converged else None
             good = result.converged and self.met is None
@@ -206,7 +210,7 @@ class _Walk:
                     continue
                 if not good and self.met is None:
                     # A saddle, or a symmetry that leaves the QP no solution: go off it.
-                    self._nudge()
+                    begin = self._nudged()
                     size, patience = largest, 4 * settings.max_iterations
                     continue
             if not good:
@@ -215,7 +219,7 @@ class _Walk:
             self.jumped |= suspect or leaving
             self.substeps += 1
             self.point, self.pulls, done = result.point, pulls, fraction
-            patience = settings.max_iterations
+            begin, patience = self.point, settings.max_iterations
             size = min(largest, size * (2.0 if result.iterations <= 5 else 1.0))
         self.pulls = target
 
@@ -226,12 +230,12 @@ class _Walk:
     def _at_saddle(self) -> bool:
         return softest_direction(self.point)[0] < 0.0
 
-    def _nudge(self) -> None:
-        """Depart from the point along its softest direction, whose sign is chosen once for all."""
+    def _nudged(self) -> KktPoint:
+        """A departure from the point along its softest direction, of a sign chosen once for all."""
         point, (_, way) = self.point, softest_direction(self.point)
         way = way * np.sign(way[np.argmax(np.abs(way))])
         at = self.problem.evaluate(point.at.y + _NUDGE * way)
-        self.point = derive(self.problem, at, point.tensions, point.forces)
+        return derive(self.problem, at, point.tensions, point.forces)
 
     def _moved(self, point: KktPoint) -> float:
         """Farthest way of a disk centre from the last point (units of L)."""

@@ -9,6 +9,7 @@ sphere) they stay there, and the reduced Hessian tells.
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 
 import numpy as np
@@ -80,9 +81,13 @@ class SqpResult:
 
 
 def solve_sqp(
-    problem: EquilibriumProblem, point: KktPoint, bounds: Bounds, max_iterations: int
+    problem: EquilibriumProblem,
+    point: KktPoint,
+    bounds: Bounds,
+    max_iterations: int,
+    deadline: float,
 ) -> SqpResult:
-    """Minimise the energy within bounds, starting from ``point``."""
+    """Minimise the energy within bounds from ``point``, until ``deadline`` (time.perf_counter)."""
     settings = problem.settings
     price, best = 10.0, np.inf
     for iteration in range(max_iterations):
@@ -91,7 +96,7 @@ def solve_sqp(
         error = point.residual + violation
         if point.residual <= settings.tolerance and violation <= settings.tolerance:
             return SqpResult(point, iteration, True)
-        found = _qp_step(point, slacks)
+        found = _qp_step(point, slacks) if time.perf_counter() < deadline else None
         if found is None:
             return SqpResult(point, iteration, False)
         step, multipliers = found

@@ -28,7 +28,9 @@ def reference_finger(data: dict[str, Any]) -> Finger:
         if o["type"] == "sphere":
             obstacles = (Sphere(np.array(o["center"]), o["radius"], name="o"),)
         else:
-            obstacles = (Cylinder(np.array(o["axis_point"]), np.array(o["axis"]), o["radius"], name="o"),)
+            obstacles = (
+                Cylinder(np.array(o["axis_point"]), np.array(o["axis"]), o["radius"], name="o"),
+            )
     return Finger(
         name=data["name"],
         length=data["length"],

@@ -3,9 +3,11 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
@@ -22,10 +24,13 @@ STEP = 1e-6
 
 def difference(function, x: np.ndarray) -> np.ndarray:
     """Central differences, last axis over x."""
-    columns = [(function(x + STEP * e) - function(x - STEP * e)) / (2 * STEP) for e in np.eye(len(x))]
+    columns = [
+        (function(x + STEP * e) - function(x - STEP * e)) / (2 * STEP) for e in np.eye(len(x))
+    ]
     return np.stack(columns, axis=-1)
 
 
+@lru_cache
 def problem(order: int, arcs: int) -> EquilibriumProblem:
     rng = np.random.default_rng(3)
     finger = make_finger(
@@ -46,6 +51,7 @@ TENSIONS, FORCES = np.array([20.0, 9.0]), np.array([3.0, 4.0, 5.0, 1.0])
 
 
 @pytest.mark.parametrize(("order", "arcs"), [(1, 1), (0, 2), (1, 2)])
+@settings(max_examples=4)
 @given(seed=st.integers(0, 10**6), size=st.floats(0.0, 0.6))
 def test_first_derivatives(order: int, arcs: int, seed: int, size: float) -> None:
     p = problem(order, arcs)
@@ -60,6 +66,7 @@ def test_first_derivatives(order: int, arcs: int, seed: int, size: float) -> Non
 
 
 @pytest.mark.parametrize(("order", "arcs"), [(1, 1), (0, 2)])
+@settings(max_examples=4)
 @given(seed=st.integers(0, 10**6), size=st.floats(0.0, 0.6))
 def test_hessian_of_the_lagrangian(order: int, arcs: int, seed: int, size: float) -> None:
     p = problem(order, arcs)
@@ -81,10 +88,10 @@ def test_hessian_of_the_lagrangian(order: int, arcs: int, seed: int, size: float
 
 @pytest.mark.parametrize("order", [0, 1])
 def test_rod_follows_its_ode(order: int) -> None:
-    """Frames and positions against direct integration of T' = T (e3, u)^ with the same curvature."""
+    """Frames and positions against integrating T' = T (e3, u)^ with the same curvature."""
     rng = np.random.default_rng(1)
     arcs = 4
-    z = rng.normal(size=(arcs, 3 * (order + 1))) * 0.15
+    z = rng.normal(size=(arcs, 3 * (order + 1))) * 0.05
     a, b = z[:, :3] * arcs, (z[:, 3:] if order else np.zeros((arcs, 3))) * arcs
     state = np.concatenate([np.zeros(3), np.eye(3).ravel()])
     rod = Rod(arcs, order).state(z)
@@ -107,14 +114,16 @@ def test_rod_at_any_angle(turn: float) -> None:
     rod = Rod(1, 0).state(np.array([[0.0, turn, 0.0]]))
     half = turn / 2
     chord = np.sinc(half / np.pi)  # sin(half) / half
-    assert rod.positions[1] == pytest.approx(chord * np.array([np.sin(half), 0, np.cos(half)]), abs=1e-9)
+    assert rod.positions[1] == pytest.approx(
+        chord * np.array([np.sin(half), 0, np.cos(half)]), abs=1e-9
+    )
     assert rod.rotations[1][:, 2] == pytest.approx([np.sin(turn), 0, np.cos(turn)], abs=1e-9)
 
 
 @pytest.mark.parametrize("order", [0, 1])
 @given(seed=st.integers(0, 10**6))
 def test_centerline_passes_through_the_disks(order: int, seed: int) -> None:
-    z = np.random.default_rng(seed).normal(size=(5, 3 * (order + 1))) * 0.4
+    z = np.random.default_rng(seed).normal(size=(5, 3 * (order + 1))) * 0.15
     rod = Rod(5, order).state(z)
     curve = centerline(5 * z.reshape(5, order + 1, 3), 1.0, 7)
     assert curve.shape == (36, 3)
@@ -158,7 +167,7 @@ def test_sensitivities(name: str, pulls: list[float], model: str) -> None:
 
 def test_sensitivity_of_a_slack_cable_is_nothing() -> None:
     solver = FingerSolver(make_finger(straight_cable(4), straight_cable(10, name="far")))
-    solution = solver.solve([0.005, 0.0])
+    solution = solver.solve([0.005, -0.02])
     assert solution.slack.tolist() == [False, True]
     assert np.all(solver.sensitivity().disks[:, :, 1] == 0)
 

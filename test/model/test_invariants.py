@@ -10,7 +10,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ccr_ros.model import Cable, Finger, FingerSolver, Pose, SolverSettings, Sphere, load_finger, solve
+from ccr_ros.model import (
+    Cable,
+    Finger,
+    FingerSolver,
+    Pose,
+    SolverSettings,
+    Sphere,
+    load_finger,
+    solve,
+)
 from ccr_ros.resources import find_config
 
 from .fingers import helical_cable, make_finger, rms, straight_cable
@@ -25,7 +34,7 @@ def wandering(turns: list[float], start: float, name: str = "w") -> Cable:
 
 
 def pose_of(finger: Finger, pull: float, **settings: object) -> np.ndarray:
-    solution = solve(finger, [pull] * len(finger.cables), SolverSettings(**settings))  # type: ignore[arg-type]
+    solution = solve(finger, [pull] * len(finger.cables), SolverSettings(time_limit=60, **settings))  # type: ignore[arg-type]
     assert solution.certificate.converged
     return solution.backbone
 
@@ -72,7 +81,7 @@ def test_planar_finger_stays_in_its_plane() -> None:
 
 
 def test_similarity() -> None:
-    """A finger twice as large in everything has the pose twice as large, the tension a quarter of EI's."""
+    """Twice as large in everything: the pose twice as large, tension per EI a quarter."""
     small = make_finger(helical_cable())
     large = replace(small, length=0.364, disk_radius=0.016, backbone_diameter=0.005)
     a, b = solve(small, [0.006]), solve(large, [0.012])
@@ -99,8 +108,8 @@ def test_constant_bending_in_closed_form() -> None:
     finger = make_finger(straight_cable(1))
     solution = solve(finger, [0.008], SolverSettings(tolerance=1e-12))
     n, l0, a = 9, finger.segment_length, finger.disk_radius
-    t = np.arccos(np.clip(solution.frames[1:, 2, 2] * solution.frames[:-1, 2, 2]
-                          + solution.frames[1:, 0, 2] * solution.frames[:-1, 0, 2], -1, 1))  # fmt: skip
+    axes = solution.frames[:, :, 2]
+    t = np.arccos(np.clip(np.sum(axes[1:] * axes[:-1], axis=1), -1, 1))
     assert t == pytest.approx(np.full(n, t[0]), rel=1e-6)
     span = 2 * (l0 / t[0] - a) * np.sin(t[0] / 2)
     assert n * span == pytest.approx(finger.length - 0.008, abs=1e-9)
@@ -163,7 +172,10 @@ def test_finer_meshes_converge_at_their_order(order: int) -> None:
     finger = make_finger(helical_cable())
     fine = pose_of(finger, 0.0073, arcs_per_segment=16)
     errors = [
-        rms(pose_of(finger, 0.0073, arcs_per_segment=k, curvature_order=order, tolerance=1e-11), fine)
+        rms(
+            pose_of(finger, 0.0073, arcs_per_segment=k, curvature_order=order, tolerance=1e-11),
+            fine,
+        )
         for k in (1, 2, 4)
     ]
     rates = np.log2(np.array(errors[:-1]) / errors[1:])

@@ -39,7 +39,9 @@ def test_matches(
         check(solution, data, state, pose, tension, force)
 
 
-def check(solution: Solution, data: dict, state: dict, pose: float, tension: float, force: float) -> None:
+def check(
+    solution: Solution, data: dict, state: dict, pose: float, tension: float, force: float
+) -> None:
     assert solution.certificate.converged
     assert solution.certificate.stable
     length = data["length"]
@@ -58,7 +60,7 @@ def check(solution: Solution, data: dict, state: dict, pose: float, tension: flo
 
 
 def test_default_beats_two_constant_arcs() -> None:
-    """One linear arc has as many unknowns as two constant ones, and a third of their error at most."""
+    """One linear arc has as many unknowns as two constant ones, and a third of their error."""
     for name in ("general_1", "helical", "contact_sphere"):
         data = reference(name)
         finger, state = reference_finger(data), data["states"][-1]
