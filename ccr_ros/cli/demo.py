@@ -47,6 +47,10 @@ def run(args: argparse.Namespace) -> int:
         progress.clear()
         print(f"ccr: error: {error}", file=sys.stderr)
         return 1
+    except (KeyboardInterrupt, SystemExit):
+        progress.clear()
+        print("ccr: interrupted; what the demo had started has ended", file=sys.stderr)
+        raise
     except BaseException:
         progress.clear()
         raise

@@ -1,0 +1,188 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Between ROS messages and the model: conversions and their checks, no physics, no topics."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from builtin_interfaces.msg import Time as TimeMessage
+from ccr_msgs.msg import CablePulls, FingerState, Object, ObjectArray, SolveCertificate
+from ccr_msgs.msg import Contact as ContactMessage
+from geometry_msgs.msg import Point, PoseArray, Quaternion, TransformStamped, Vector3
+from geometry_msgs.msg import Pose as PoseMessage
+from shape_msgs.msg import SolidPrimitive
+from std_msgs.msg import Header
+
+from ccr_ros.model import (
+    Box,
+    Certificate,
+    Contact,
+    Cylinder,
+    Finger,
+    InvalidValue,
+    Obstacle,
+    Pose,
+    Solution,
+    Sphere,
+    UnknownName,
+)
+from ccr_ros.viz.recording import SolidObject
+
+_KINDS = {
+    SolidPrimitive.BOX: "box",
+    SolidPrimitive.SPHERE: "sphere",
+    SolidPrimitive.CYLINDER: "cylinder",
+}
+_OTHER_KINDS = {SolidPrimitive.CONE: "CONE", SolidPrimitive.PRISM: "PRISM"}
+
+
+def pulls_from_message(message: CablePulls, finger: Finger) -> np.ndarray:
+    """Return the pulls (m,) [m] in the finger's cable order; a cable that is not named: 0.
+
+    Raises:
+        UnknownName: A name that is no cable of the finger.
+        InvalidValue: Names that occur twice, a count that does not fit, or a pull that is not
+            finite or beyond the finger's length.
+    """
+    names, values = list(message.names), [float(v) for v in message.pulls]
+    if not names:
+        return finger.pulls_array(values)
+    for name in names:
+        if names.count(name) > 1:
+            raise InvalidValue("names", name, "given once")
+    if len(names) != len(values):
+        raise InvalidValue(
+            "pulls", values, f"{len(names)} numbers [m], one per name (got {len(values)})"
+        )
+    return finger.pulls_array(dict(zip(names, values, strict=True)))
+
+
+def bodies_from_message(message: ObjectArray, gripper_frame: str) -> tuple[SolidObject, ...]:
+    """Return the objects as bodies in the gripper's frame.
+
+    Raises:
+        UnknownName: The frame is not the gripper's, or a primitive is of a kind not known here.
+        InvalidValue: A name is empty or occurs twice, or a size, pose, mass or friction is bad.
+    """
+    if message.header.frame_id not in ("", gripper_frame):
+        raise UnknownName("frame", message.header.frame_id, [gripper_frame])
+    bodies: list[SolidObject] = []
+    for index, item in enumerate(message.objects):
+        place = f"objects[{index}]"
+        try:
+            bodies.append(_body(item))
+        except InvalidValue as error:
+            raise error.located(place) from None
+        if bodies[-1].name in (body.name for body in bodies[:-1]):
+            raise InvalidValue(f"{place}.name", item.name, "unique among the objects")
+    return tuple(bodies)
+
+
+def obstacle_from_body(body: SolidObject) -> Obstacle:
+    """Return the obstacle that a body is to a finger, in the body's frame of reference.
+
+    A cylinder's height is not used: to a finger it is infinite along its axis.
+    """
+    if body.kind == "sphere":
+        return Sphere(body.pose.position, body.dimensions[0], name=body.name)
+    if body.kind == "box":
+        return Box(
+            body.pose.position, np.array(body.dimensions), body.pose.orientation, name=body.name
+        )
+    return Cylinder(
+        body.pose.position, body.pose.rotation[:, 2], body.dimensions[1], name=body.name
+    )
+
+
+def pose_message(position: np.ndarray, orientation: np.ndarray) -> PoseMessage:
+    """Return a pose from a position (3,) [m] and a quaternion (4,) (x, y, z, w)."""
+    x, y, z = map(float, position)
+    qx, qy, qz, qw = map(float, orientation)
+    return PoseMessage(
+        position=Point(x=x, y=y, z=z), orientation=Quaternion(x=qx, y=qy, z=qz, w=qw)
+    )
+
+
+def pose_array(header: Header, points: np.ndarray, orientations: np.ndarray) -> PoseArray:
+    """Return poses at points (k, 3) [m], each with the orientation of its disk, (>= k, 4)."""
+    return PoseArray(
+        header=header,
+        poses=[pose_message(p, q) for p, q in zip(points, orientations, strict=False)],
+    )
+
+
+def state_message(header: Header, solution: Solution, stale: bool, dropped: int) -> FingerState:
+    """Return the state of a finger; everything in it is in the finger's base frame."""
+    tip = solution.tip
+    return FingerState(
+        header=header,
+        finger=solution.finger.name,
+        cables=list(solution.finger.cable_names),
+        pulls=solution.pulls.tolist(),
+        tensions=solution.tensions.tolist(),
+        slack=[bool(slack) for slack in solution.slack],
+        forces_are=solution.finger.forces_are,
+        contacts=[contact_message(contact) for contact in solution.contacts],
+        tip=pose_message(tip.position, tip.orientation),
+        energy=float(solution.energy),
+        certificate=certificate_message(solution.certificate),
+        stale=stale,
+        dropped=dropped,
+    )
+
+
+def contact_message(contact: Contact) -> ContactMessage:
+    """Return one contact, in the frame it is in."""
+    x, y, z = map(float, contact.position)
+    nx, ny, nz = map(float, contact.normal)
+    return ContactMessage(
+        disk=int(contact.disk),
+        point=contact.point,
+        cable=contact.cable,
+        obstacle=contact.obstacle,
+        position=Point(x=x, y=y, z=z),
+        normal=Vector3(x=nx, y=ny, z=nz),
+        force=float(contact.force),
+    )
+
+
+def certificate_message(certificate: Certificate) -> SolveCertificate:
+    """Return a certificate; its texts stay behind (they go to diagnostics)."""
+    return SolveCertificate(
+        converged=bool(certificate.converged),
+        stable=bool(certificate.stable),
+        branch_jump=bool(certificate.branch_jump),
+        kkt=float(certificate.kkt),
+        cable_error=float(certificate.cable_error),
+        penetration=float(certificate.penetration),
+        smallest_eigenvalue=float(certificate.smallest_eigenvalue),
+        iterations=int(certificate.iterations),
+        solve_time=float(certificate.solve_time),
+    )
+
+
+def transform_message(stamp: TimeMessage, parent: str, child: str, pose: Pose) -> TransformStamped:
+    """Return the transform that is the pose of ``child`` in ``parent``."""
+    message = TransformStamped(header=Header(stamp=stamp, frame_id=parent), child_frame_id=child)
+    x, y, z = map(float, pose.position)
+    message.transform.translation = Vector3(x=x, y=y, z=z)
+    message.transform.rotation = pose_message(pose.position, pose.orientation).orientation
+    return message
+
+
+def _body(item: Object) -> SolidObject:
+    kind = _KINDS.get(item.primitive.type)
+    if kind is None:
+        given = _OTHER_KINDS.get(item.primitive.type, item.primitive.type)
+        raise InvalidValue("primitive.type", given, "BOX, SPHERE or CYLINDER")
+    for key in ("mass", "friction"):
+        value = float(getattr(item, key))
+        if not 0.0 <= value < math.inf:
+            raise InvalidValue(key, value, "a finite number >= 0")
+    p, q = item.pose.position, item.pose.orientation
+    try:
+        pose = Pose(np.array([p.x, p.y, p.z]), np.array([q.x, q.y, q.z, q.w]))
+    except InvalidValue as error:
+        raise error.located("pose") from None
+    return SolidObject(item.name, kind, tuple(item.primitive.dimensions), pose)

@@ -1,0 +1,214 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One finger in the solver node: its topics, its warm solver, its last good pose."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from builtin_interfaces.msg import Time as TimeMessage
+from ccr_msgs.msg import CablePulls, FingerState
+from geometry_msgs.msg import PoseArray
+from rclpy.node import Node
+from std_msgs.msg import Header
+from tf2_ros import TransformBroadcaster
+
+from ccr_ros.model import CcrError, FingerSolver, MountedFinger, Obstacle, Solution, SolverSettings
+
+from .conversions import pose_array, pulls_from_message, state_message, transform_message
+from .frames import FingerFrames
+from .qos import COMMAND_QUEUE, LATCHED
+
+_TIMES_KEPT = 1000  # solve times, for the percentiles
+_WARN_EVERY = 2.0  # s
+_MOST_LOOKS = 32  # turns of the executor that a backlog may delay a solve by
+
+
+@dataclass(frozen=True)
+class _Task:
+    """Pulls to be solved [m], and the time they are of."""
+
+    pulls: np.ndarray
+    stamp: TimeMessage
+
+
+class FingerChannel:
+    """Keeps the newest pulls of one finger, solves them when told to, publishes the pose.
+
+    Receiving only stores, so that many messages cost one solve. Bad pulls are refused when they
+    come and change nothing else.
+
+    Args:
+        node: The node to make the topics on.
+        mounted: The finger and its place in the gripper.
+        frames: Its frames.
+        settings: Of the solver.
+        broadcaster: For the tip's transform.
+        wake: Called when there is something to solve.
+
+    Raises:
+        InvalidValue: An obstacle in the finger's file overlaps its base disk.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        mounted: MountedFinger,
+        frames: FingerFrames,
+        settings: SolverSettings,
+        broadcaster: TransformBroadcaster,
+        wake: Callable[[], None],
+    ) -> None:
+        self.finger = mounted.finger
+        self.base = mounted.base
+        self.frames = frames
+        self.solver = FingerSolver(mounted.finger, settings)
+        self.solution: Solution | None = None  # the last good one
+        self.fault = ""  # why the newest pulls are not what the pose shows
+        self.received = self.refused = self.dropped = self.solves = self.failures = 0
+        self.solve_times: deque[float] = deque(maxlen=_TIMES_KEPT)
+
+        self._node = node
+        self._log = node.get_logger().get_child(self.finger.name)
+        self._broadcaster = broadcaster
+        self._wake = wake
+        now = node.get_clock().now().to_msg()
+        # Shown at once: the finger at rest.
+        self._wanted = _Task(np.zeros(len(self.finger.cables)), now)
+        self._pose_stamp = now
+        self._accepted = self._wanted  # the last that the solver took
+        self._refusal = ""  # why the newest message was refused
+        self._unsolved = True  # whether there is something to solve
+        self._new_scene = True  # whether the obstacles are newer than the pose
+        self._waiting = False  # whether _wanted came as a message and is not solved yet
+        self._looks = self._seen = self._dropped_told = 0
+        self._backlog = False  # whether the last look found newer pulls
+
+        name = self.finger.name
+        self._backbone = node.create_publisher(PoseArray, f"{name}/backbone", LATCHED)
+        self._cables = {
+            cable: node.create_publisher(PoseArray, f"{name}/cables/{cable}", LATCHED)
+            for cable in self.finger.cable_names
+        }
+        self._state = node.create_publisher(FingerState, f"{name}/state", LATCHED)
+        node.create_subscription(CablePulls, f"{name}/cable_pulls", self._receive, COMMAND_QUEUE)
+
+    @property
+    def stale(self) -> bool:
+        """Whether the pose is not that of the newest pulls, because they were refused or failed."""
+        return bool(self.fault)
+
+    @property
+    def unsolved(self) -> bool:
+        """Whether there is something to solve."""
+        return self._unsolved
+
+    def set_obstacles(self, obstacles: Sequence[Obstacle]) -> None:
+        """Replace all obstacles, given in the finger's base frame; nothing is solved yet.
+
+        Raises:
+            InvalidValue: One overlaps the base disk; nothing has changed.
+        """
+        self.solver.obstacles = tuple(obstacles)
+
+    def solve_again(self, stamp: TimeMessage) -> None:
+        """Ask for a new solve of the wanted pulls, because the obstacles are new at this time."""
+        self._accepted = _Task(self._accepted.pulls, stamp)
+        if not self._waiting:
+            self._wanted = _Task(self._wanted.pulls, stamp)
+        self._unsolved = self._new_scene = True
+
+    def settled(self) -> bool:
+        """Tell whether no newer pulls have come in since the last look, which this one becomes.
+
+        An executor hands over one message per turn, so a backlog shows as one more at every look.
+        It is let in before a solve, but not for ever.
+        """
+        quiet = self._seen == self.received
+        self._backlog = not quiet
+        self._seen = self.received
+        self._looks = 0 if quiet or self._looks >= _MOST_LOOKS else self._looks + 1
+        return self._looks == 0
+
+    def solve(self) -> None:
+        """Solve the wanted pulls and publish: the new pose, or the last good one as stale."""
+        task = self._wanted
+        self._unsolved = self._waiting = False
+        self._warn_of_backlog()
+        try:
+            solution = self.solver.solve(task.pulls)
+        except CcrError as error:  # a pull beyond its cable's own limit
+            self._wanted = self._accepted
+            self._unsolved = self._new_scene
+            self._refuse(error)
+            return
+        self._accepted, self._new_scene = task, False
+        self.solves += 1
+        self.solve_times.append(solution.certificate.solve_time)
+        if solution.certificate.converged:
+            self.fault = self._refusal
+            self.solution = solution
+            self._pose_stamp = task.stamp
+            self._publish_pose(solution)
+        else:
+            self.failures += 1
+            failure = f"not converged: {solution.certificate.message}"
+            self.fault = self._refusal or failure
+            self._log.warning(
+                f"{failure} (the last good pose stays)", throttle_duration_sec=_WARN_EVERY
+            )
+        self._publish_state()
+
+    def _receive(self, message: CablePulls) -> None:
+        self.received += 1
+        try:
+            pulls = pulls_from_message(message, self.finger)
+        except CcrError as error:
+            self._refuse(error)
+            return
+        if self._waiting:
+            self.dropped += 1
+        elif not self._backlog:
+            self._seen = self.received  # a single message is solved at the first look
+        self._refusal = ""
+        self._wanted = _Task(pulls, self._stamp(message.header.stamp))
+        self._unsolved = self._waiting = True
+        self._wake()
+
+    def _refuse(self, error: CcrError) -> None:
+        self.refused += 1
+        self.fault = self._refusal = f"pulls refused: {error}"
+        self._log.warning(
+            f"{self.fault} (the last good pose stays)", throttle_duration_sec=_WARN_EVERY
+        )
+        self._publish_state()
+        self._wake()  # that the diagnostics tell it at once
+
+    def _warn_of_backlog(self) -> None:
+        if self.dropped > self._dropped_told:
+            self._dropped_told = self.dropped
+            self._log.warning(
+                f"pulls come faster than they can be solved; {self.dropped} were dropped so far",
+                throttle_duration_sec=_WARN_EVERY,
+            )
+
+    def _stamp(self, given: TimeMessage) -> TimeMessage:
+        # Zero is what an unstamped message has; tf would take it for the beginning of time.
+        return given if given.sec or given.nanosec else self._node.get_clock().now().to_msg()
+
+    def _publish_pose(self, solution: Solution) -> None:
+        header = Header(stamp=self._pose_stamp, frame_id=self.frames.base)
+        quaternions = solution.quaternions
+        self._backbone.publish(pose_array(header, solution.backbone, quaternions))
+        for cable, publisher in self._cables.items():
+            publisher.publish(pose_array(header, solution.cables[cable], quaternions))
+        self._broadcaster.sendTransform(
+            transform_message(header.stamp, self.frames.base, self.frames.tip, solution.tip)
+        )
+
+    def _publish_state(self) -> None:
+        if self.solution is not None:
+            header = Header(stamp=self._pose_stamp, frame_id=self.frames.base)
+            self._state.publish(state_message(header, self.solution, self.stale, self.dropped))

@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The solver node's parameters: declared with description and range, then read as one value."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+from rclpy.node import Node
+
+from ccr_ros.model import Gripper, InvalidValue, SolverSettings, load_gripper
+from ccr_ros.resources import find_config
+
+from .frames import prefix_of
+
+MARKERS = "markers"
+MARKER_RATE = "marker_rate"
+
+_FIXED = "Takes effect at start only."
+
+
+@dataclass(frozen=True)
+class SolverParameters:
+    """What is fixed when the solver node starts.
+
+    Attributes:
+        gripper: From the gripper file.
+        settings: How its fingers are solved.
+        frame_prefix: Before every frame name but the gripper's own.
+        gripper_frame: The gripper's frame.
+    """
+
+    gripper: Gripper
+    settings: SolverSettings
+    frame_prefix: str
+    gripper_frame: str
+
+
+def declare(node: Node) -> SolverParameters:
+    """Declare all parameters of the solver node and return the fixed ones.
+
+    Raises:
+        CcrError: The gripper file is not found or not valid, or a setting is not.
+        rclpy.exceptions.ParameterException: A value is of the wrong type or out of its range.
+    """
+
+    def fixed(name: str, default: Any, text: str, limits: str = "", **ranges: list) -> Any:
+        descriptor = ParameterDescriptor(
+            description=f"{text} {_FIXED}", additional_constraints=limits, read_only=True, **ranges
+        )
+        return node.declare_parameter(name, default, descriptor).value
+
+    gripper_file = fixed(
+        "gripper_file",
+        "gripper_sphere",
+        "Gripper file: a path, or the name of a file that comes with ccr_ros.",
+    )
+    arcs = fixed(
+        "arcs_per_segment",
+        SolverSettings.arcs_per_segment,
+        "Number of arcs that a segment between two disks is modelled by; more are finer, slower.",
+        integer_range=[IntegerRange(from_value=1, to_value=64, step=1)],
+    )
+    cable_model = fixed(
+        "cable_model",
+        SolverSettings.cable_model,
+        "frictionless: a cable's total length is given, its tension is uniform; "
+        "proportional: every span is shortened alike.",
+        "frictionless or proportional",
+    )
+    time_limit = fixed(
+        "time_limit",
+        1.0,
+        "Longest time of one solve [s]; one that takes longer ends without a new pose.",
+        floating_point_range=[FloatingPointRange(from_value=0.001, to_value=60.0, step=0.0)],
+    )
+    prefix = fixed(
+        "frame_prefix",
+        prefix_of(node.get_namespace()),
+        "Put before the fingers' frame names; its default comes from the node's namespace.",
+        "no '/' at the start",
+    )
+    gripper_frame = fixed(
+        "gripper_frame",
+        f"{prefix}gripper_base",
+        "Frame the fingers stand in and objects are given in; its default has the frame_prefix.",
+        "not empty, no '/' at the start",
+    )
+    node.declare_parameter(
+        MARKERS, True, ParameterDescriptor(description="Publish markers for RViz and the like.")
+    )
+    node.declare_parameter(
+        MARKER_RATE,
+        20.0,
+        ParameterDescriptor(
+            description="Most marker messages per second [Hz]; none are sent while nothing moves.",
+            floating_point_range=[FloatingPointRange(from_value=0.1, to_value=100.0, step=0.0)],
+        ),
+    )
+    return SolverParameters(
+        gripper=load_gripper(find_config(gripper_file)),
+        settings=SolverSettings(
+            arcs_per_segment=arcs, cable_model=cable_model, time_limit=time_limit
+        ),
+        frame_prefix=_frame("frame_prefix", prefix, may_be_empty=True),
+        gripper_frame=_frame("gripper_frame", gripper_frame, may_be_empty=False),
+    )
+
+
+def _frame(name: str, value: str, may_be_empty: bool) -> str:
+    # tf2 refuses frames that start with '/'.
+    if value.startswith("/") or value != value.strip() or not (value or may_be_empty):
+        empty = "" if may_be_empty else "not empty, "
+        raise InvalidValue(name, value, f"{empty}without '/' at the start and blanks around it")
+    return value

@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Conversions between messages and the model that the topics' tests do not reach."""
+
+import numpy as np
+import pytest
+from probe import objects, sphere
+from shape_msgs.msg import SolidPrimitive
+
+from ccr_ros.model import Box, Cylinder, InvalidValue, Sphere
+from ccr_ros.nodes.conversions import bodies_from_message, obstacle_from_body
+from ccr_ros.nodes.frames import FingerFrames, prefix_of
+
+# A quarter turn about x: the body's z points along -y.
+TURN = (np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5))
+
+
+def obstacle(kind, dimensions):
+    item = sphere("thing", 1.0, (0.1, 0.2, 0.3))
+    item.primitive = SolidPrimitive(type=kind, dimensions=dimensions)
+    turn = item.pose.orientation
+    turn.x, turn.y, turn.z, turn.w = TURN
+    (body,) = bodies_from_message(objects(item), "base")
+    return obstacle_from_body(body)
+
+
+def test_sphere():
+    found = obstacle(SolidPrimitive.SPHERE, [0.05])
+    assert isinstance(found, Sphere)
+    assert (found.name, found.radius, found.center.tolist()) == ("thing", 0.05, [0.1, 0.2, 0.3])
+
+
+def test_box_is_turned():
+    found = obstacle(SolidPrimitive.BOX, [0.02, 0.04, 0.06])
+    assert isinstance(found, Box)
+    # Its z side lies along y: half of it away is the surface.
+    distance = found.signed_distance(np.array([[0.1, 0.2 + 0.04, 0.3], [0.1, 0.2, 0.3 + 0.04]]))
+    np.testing.assert_allclose(distance, [0.01, 0.02], atol=1e-12)
+
+
+def test_cylinder_has_an_axis_and_no_height():
+    found = obstacle(SolidPrimitive.CYLINDER, [0.01, 0.05])
+    assert isinstance(found, Cylinder)
+    np.testing.assert_allclose(found.axis, [0.0, -1.0, 0.0], atol=1e-12)
+    distance = found.signed_distance(np.array([[0.1, 7.0, 0.3 + 0.06]]))
+    np.testing.assert_allclose(distance, [0.01], atol=1e-12)
+
+
+def test_an_unknown_kind_is_named():
+    with pytest.raises(InvalidValue, match=r"objects\[0\]\.primitive\.type: 'PRISM'"):
+        obstacle(SolidPrimitive.PRISM, [0.1, 0.1])
+
+
+@pytest.mark.parametrize(
+    ("namespace", "prefix"), [("/", ""), ("/gripper", "gripper/"), ("/left/hand", "left/hand/")]
+)
+def test_frames_come_from_the_namespace(namespace, prefix):
+    assert prefix_of(namespace) == prefix
+    frames = FingerFrames.of("thumb", "world", prefix_of(namespace))
+    assert frames == FingerFrames("world", f"{prefix}thumb_base", f"{prefix}thumb_tip")

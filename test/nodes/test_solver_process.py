@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The solver node as a process of its own: on the graph, at its end, and when it cannot start."""
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from probe import shown
+
+ROOT = Path(__file__).resolve().parents[2]
+RUN = "import sys; from ccr_ros.nodes.entry import solver_node; sys.exit(solver_node())"
+WAIT = 30.0  # s; never reached when all is well
+
+
+def command(*ros_args, script=RUN):
+    return [sys.executable, "-c", script, "--ros-args", *ros_args]
+
+
+def environment():
+    paths = [str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
+
+
+@pytest.fixture
+def launch():
+    """Return a function that starts a solver node in a process; none is left behind."""
+    running = []
+
+    def launch(*ros_args, script=RUN):
+        process = subprocess.Popen(
+            command(*ros_args, script=script),
+            env=environment(),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        running.append(process)
+        return process
+
+    yield launch
+    for process in running:
+        if process.poll() is None:
+            process.kill()
+        process.communicate()
+
+
+def end(process, how):
+    process.send_signal(how)
+    _, errors = process.communicate(timeout=WAIT)
+    assert "Traceback" not in errors
+    return process.returncode
+
+
+def test_two_processes_and_a_probe(probe, launch, small_gripper):
+    left = launch("-r", "__ns:=/left", "-p", f"gripper_file:={small_gripper}")
+    right = launch("-r", "__ns:=/right", "-p", f"gripper_file:={small_gripper}")
+    one = probe.pull_and_wait("/left/thumb", [0.005, 0.0])
+    other = probe.pull_and_wait("/right/thumb", [0.0, 0.004])
+    assert (list(one.pulls), list(other.pulls)) == ([0.005, 0.0], [0.0, 0.004])
+    assert one.header.frame_id == "left/thumb_base"
+    assert other.header.frame_id == "right/thumb_base"
+    assert end(left, signal.SIGINT) == 0
+    assert end(right, signal.SIGTERM) == 0
+
+
+def test_who_comes_late_sees_all_at_once(probe, launch):
+    process = launch("-r", "__ns:=/gripper")
+    probe.pull_and_wait("finger_2", [0.003])
+    probe.spin_for(0.3)
+    array = probe.until(probe.markers, "the latched markers")[0]
+    assert len(shown(array, "finger_3/disks")) == 10
+    assert end(process, signal.SIGINT) == 0
+
+
+@pytest.mark.parametrize("how", ["SIGINT", "SIGTERM"])
+def test_ends_well_in_the_middle_of_a_solve(launch, how):
+    """The context is down when the solve is done, so that its pose can no more be published."""
+    interrupted = f"""
+import os, signal, sys, time
+from ccr_ros.runtime import enable_ros
+enable_ros()
+from ccr_ros.model import FingerSolver
+solve = FingerSolver.solve
+def interrupted(*args):
+    os.kill(os.getpid(), signal.{how})
+    time.sleep(0.5)  # rclpy answers signals in a thread of its own
+    return solve(*args)
+FingerSolver.solve = interrupted
+from ccr_ros.nodes.entry import solver_node
+sys.exit(solver_node())
+"""
+    process = launch("-r", "__ns:=/gripper", script=interrupted)
+    _, errors = process.communicate(timeout=WAIT)
+    assert "Traceback" not in errors
+    assert process.returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("parameter", "text"),
+    [
+        ("gripper_file:=no_such_gripper", "gripper_sphere"),
+        ("gripper_file:=straight", "straight.yaml"),
+        ("arcs_per_segment:=0", "arcs_per_segment"),
+    ],
+)
+def test_what_cannot_start_says_why_in_one_line(parameter, text):
+    done = subprocess.run(
+        command("-p", parameter),
+        env=environment(),
+        capture_output=True,
+        text=True,
+        timeout=WAIT,
+        check=False,
+    )
+    assert done.returncode == 1
+    (line,) = done.stderr.strip().splitlines()
+    assert line.startswith("solver_node: error: ")
+    assert text in line
