@@ -150,8 +150,8 @@ def _message(problem: EquilibriumProblem, walk: Walk, stable: bool) -> str:
         else:
             why = "no equilibrium was found beyond"
         return (
-            f"{why} {walk.reached:.1%} of the way to the wanted pulls; the last good pose on the way is at"
-            f" {where}. Pull less, or give the obstacles more room."
+            f"{why} {walk.reached:.1%} of the way to the wanted pulls; the last good pose on the way"
+            f" is at {where}. Pull less, or give the obstacles more room."
         )
     notes = []
     if walk.jumped:
