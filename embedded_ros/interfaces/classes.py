@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Makes Python classes from message specifications; they behave as rosidl's classes do."""
+
+from __future__ import annotations
+
+import array
+import re
+from collections.abc import Callable
+from operator import attrgetter
+from typing import Any, ClassVar
+
+import numpy as np
+
+from .checks import NUMPY_TYPES, field_check
+from .spec import CODES, Field, MessageSpec
+
+_UNSET: Any = object()
+
+
+def snake_case(name: str) -> str:
+    """``MultiArrayLayout`` -> ``multi_array_layout``, as rosidl names its modules."""
+    name = re.sub(r"(.)([A-Z][a-z]+)", r"\1_\2", name)
+    return re.sub(r"([a-z0-9])([A-Z])", r"\1_\2", name).lower()
+
+
+class MessageMeta(type):
+    """Keeps constants and defaults readable on the class, and read-only."""
+
+    _constants_: frozenset[str]
+
+    def __setattr__(cls, name: str, value: Any) -> None:
+        if name in cls._constants_:
+            raise AttributeError(f"can't set the constant {cls.__name__}.{name}")
+        super().__setattr__(name, value)
+
+
+class Message(metaclass=MessageMeta):
+    """Base of all message classes."""
+
+    __slots__: tuple[str, ...] = ()
+    _constants_: ClassVar[frozenset[str]] = frozenset()
+    _fields_and_field_types: ClassVar[dict[str, str]] = {}
+    _spec_: ClassVar[MessageSpec]
+
+    @classmethod
+    def get_fields_and_field_types(cls) -> dict[str, str]:
+        """Member names and their IDL type names, in the order of the definition."""
+        return dict(cls._fields_and_field_types)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, self.__class__):
+            return False
+        for slot in self.__slots__:
+            mine, theirs = getattr(self, slot), getattr(other, slot)
+            if isinstance(mine, np.ndarray) or isinstance(theirs, np.ndarray):
+                if not np.array_equal(mine, theirs):
+                    return False
+            elif mine != theirs:
+                return False
+        return True
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        parts = []
+        for slot in self.__slots__:
+            value = getattr(self, slot)
+            text = repr(value.tolist()) if isinstance(value, array.array) else repr(value)
+            parts.append(f"{slot[1:]}={text}")
+        package, kind, _ = type(self)._spec_.name.split("/")
+        return f"{package}.{kind}.{type(self).__name__}({', '.join(parts)})"
+
+
+def _default_factory(member: Field, classes: Callable[[str], type]) -> Callable[[], Any]:
+    """A function that makes the initial value of a member."""
+    ftype, default = member.type, member.default
+    if ftype.is_message:
+        cls = classes(ftype.base)
+        if ftype.kind == "scalar":
+            return cls
+        return (lambda: [cls() for _ in range(ftype.size)]) if ftype.kind == "array" else list
+    zero: Any = {"bool": False, "byte": b"\0", "string": "", "wstring": ""}.get(ftype.base)
+    if zero is None:
+        zero = 0.0 if ftype.base.startswith("float") else 0
+    if ftype.kind == "scalar":
+        value = zero if default is None else type(zero)(default)
+        return lambda: value
+    values = (
+        default if default is not None else [zero] * (ftype.size if ftype.kind == "array" else 0)
+    )
+    if not ftype.is_numeric:
+        return lambda: list(values)
+    if ftype.kind == "sequence":
+        return lambda: array.array(CODES[ftype.base], values)
+    return lambda: np.array(values, dtype=NUMPY_TYPES[ftype.base])
+
+
+def _make_members(spec: MessageSpec, classes: Callable[[str], type]) -> dict[str, Any]:
+    """Write ``__init__`` (keyword arguments only, defaults made only where needed) and the
+    properties.
+    """
+    scope: dict[str, Any] = {"UNSET": _UNSET}
+    names = [member.name for member in spec.fields]
+    arguments = "".join(f"{name}=UNSET, " for name in names)
+    lines = [f"def __init__(self, {'*, ' + arguments if names else ''}**unknown):"]
+    lines.append("    unknown.pop('check_fields', None)")
+    lines.append("    if unknown:")
+    lines.append("        raise AssertionError('Invalid arguments passed to constructor: '")
+    lines.append("                             + ', '.join(sorted(unknown)))")
+    for member in spec.fields:
+        name, ftype = member.name, member.type
+        factory = _default_factory(member, classes)
+        if ftype.kind == "scalar" and not ftype.is_message:
+            scope[f"D_{name}"], default = factory(), f"D_{name}"
+        else:
+            scope[f"D_{name}"], default = factory, f"D_{name}()"
+        lines.append(f"    if {name} is UNSET: self._{name} = {default}")
+        lines.append(f"    else: self.{name} = {name}")
+    for member in spec.fields:
+        name, ftype = member.name, member.type
+        scope[f"check_{name}"] = field_check(ftype, classes)
+        checked = f"check_{name}(value, '{name}')"
+        if ftype.kind == "scalar" and ftype.base == "float64":
+            # The commonest member by far: spare it the call.
+            checked = f"value if type(value) is float else {checked}"
+        lines.append(f"def set_{name}(self, value): self._{name} = {checked}")
+    exec(compile("\n".join(lines), f"<class {spec.name}>", "exec"), scope)
+    members: dict[str, Any] = {"__init__": scope["__init__"]}
+    for member in spec.fields:
+        members[member.name] = property(
+            attrgetter("_" + member.name),
+            scope[f"set_{member.name}"],
+            doc=f"Message field '{member.name}' ({member.type.idl_name()}).",
+        )
+    return members
+
+
+def make_message_class(spec: MessageSpec, classes: Callable[[str], type]) -> type[Message]:
+    """Make the class of `spec`; `classes` gives the class of a member's message type."""
+    package, kind, name = spec.name.split("/")
+    constants = {constant.name: constant.value for constant in spec.constants}
+    defaults = {}
+    for member in spec.fields:
+        if member.default is not None:
+            defaults[f"{member.name.upper()}__DEFAULT"] = _default_factory(member, classes)()
+    file_stem = re.sub(
+        r"_(Request|Response|Event|Goal|Result|Feedback|SendGoal.*|GetResult.*)$", "", name
+    )
+    namespace: dict[str, Any] = {
+        "__slots__": tuple("_" + member.name for member in spec.fields),
+        "__module__": f"{package}.{kind}._{snake_case(file_stem if kind != 'msg' else name)}",
+        "__doc__": f"Message class '{name}' of {package}.",
+        "_spec_": spec,
+        "_fields_and_field_types": {m.name: m.type.idl_name() for m in spec.fields},
+        "_constants_": frozenset(constants) | frozenset(defaults),
+        **constants,
+        **defaults,
+        **_make_members(spec, classes),
+    }
+    return MessageMeta(name, (Message,), namespace)  # type: ignore[return-value]

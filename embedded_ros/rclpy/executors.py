@@ -1,0 +1,400 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Executors: they wait for work of their nodes and run the callbacks."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+import warnings
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from typing import TYPE_CHECKING, Any
+
+from embedded_ros.transport import Waiter
+
+from .exceptions import InvalidHandle
+from .impl.executor_parts import (
+    ConditionReachedException,
+    ExternalShutdownException,
+    ShutdownException,
+    TimeoutException,
+    TimeoutObject,
+    WorkTracker,
+)
+from .impl.queued import Work, await_or_execute
+from .task import Future, Task
+from .utilities import get_default_context, timeout_sec_to_nsec
+
+if TYPE_CHECKING:
+    from .node import Node
+
+__all__ = [
+    "ConditionReachedException",
+    "Executor",
+    "ExternalShutdownException",
+    "MultiThreadedExecutor",
+    "ShutdownException",
+    "SingleThreadedExecutor",
+    "TimeoutException",
+    "TimeoutObject",
+]
+
+
+class Executor:
+    """Base of executors; a subclass defines :meth:`spin_once` and
+    :meth:`spin_once_until_future_complete`.
+    """
+
+    def __init__(self, *, context: Any = None) -> None:
+        self._context = get_default_context() if context is None else context
+        self._nodes: list[Node] = []
+        self._nodes_lock = threading.RLock()
+        self._tasks: list[tuple[Task, Any, Any]] = []
+        self._tasks_lock = threading.Lock()
+        self._waiter: Waiter | None = self._context.participant.create_waiter()
+        self._is_shutdown = False
+        self._work_tracker = WorkTracker()
+        self._work: Iterator[tuple[Task, Any, Any]] | None = None
+        self._work_arguments: Any = None
+        self._context.add_waker(self)
+
+    @property
+    def context(self) -> Any:
+        """The context of the executor."""
+        return self._context
+
+    def create_task(self, callback: Callable[..., Any] | Any, *args: Any, **kwargs: Any) -> Task:
+        """Have a function or coroutine run while spinning; the task is a future of its result."""
+        task = Task(callback, args, kwargs, executor=self)
+        with self._tasks_lock:
+            self._tasks.append((task, None, None))
+        self.wake()
+        return task
+
+    def shutdown(self, timeout_sec: float | None = None) -> bool:
+        """Stop, and wait for callbacks that are running; False when they outlast the timeout."""
+        self._is_shutdown = True
+        self.wake()
+        if not self._work_tracker.wait(timeout_sec):
+            return False
+        with self._nodes_lock:
+            self._nodes = []
+        waiter, self._waiter = self._waiter, None
+        if waiter is not None:
+            waiter.close()
+        self._work = None
+        return True
+
+    def add_node(self, node: Node) -> bool:
+        """Take care of a node; it leaves the executor it was in. False when it is here already."""
+        with self._nodes_lock:
+            if node in self._nodes:
+                return False
+            self._nodes.append(node)
+            node.executor = self  # type: ignore[assignment]
+        self.wake()
+        return True
+
+    def remove_node(self, node: Node) -> None:
+        """Take care of a node no longer."""
+        with self._nodes_lock:
+            if node in self._nodes:
+                self._nodes.remove(node)
+        self.wake()
+
+    def wake(self) -> None:
+        """Have the executor look for work again."""
+        waiter = self._waiter
+        if waiter is not None:
+            waiter.wake()
+
+    def _progress(self) -> None:
+        """An entity or callback group became free: threads of a pool tell the one that waits."""
+        self.wake()
+
+    def get_nodes(self) -> list[Node]:
+        """The nodes in this executor."""
+        with self._nodes_lock:
+            return list(self._nodes)
+
+    def spin(self) -> None:
+        """Run callbacks until shutdown."""
+        while self._context.ok() and not self._is_shutdown:
+            self.spin_once()
+
+    def spin_until_future_complete(self, future: Future, timeout_sec: float | None = None) -> None:
+        """Run callbacks until ``future`` is done, the timeout passes or the context ends."""
+        future.add_done_callback(lambda _: self.wake())
+        end = None if timeout_sec is None or timeout_sec < 0 else time.monotonic() + timeout_sec
+        left = None if end is None else TimeoutObject(timeout_sec or 0.0)
+        while self._context.ok() and not future.done() and not self._is_shutdown:
+            self.spin_once_until_future_complete(future, left)
+            if end is not None and left is not None:
+                left.timeout = end - time.monotonic()
+                if left.timeout <= 0:
+                    return
+
+    def spin_once(self, timeout_sec: float | None = None) -> None:
+        """Wait for one callback and run it; None or a negative timeout waits forever."""
+        raise NotImplementedError()
+
+    def spin_once_until_future_complete(
+        self, future: Future, timeout_sec: float | TimeoutObject | None = None
+    ) -> None:
+        """As :meth:`spin_once`, but return as soon as ``future`` is done."""
+        raise NotImplementedError()
+
+    def can_execute(self, entity: Any) -> bool:
+        """Whether a callback of the entity may run now."""
+        return not entity._executor_event and entity.callback_group.can_execute(entity)
+
+    def _make_task(self, entity: Any, node: Node, take: Callable[[], Work | None]) -> Task:
+        """A task that claims the callback group, takes the entity's work and runs it."""
+        entity._executor_event = True
+
+        async def run() -> None:
+            group = entity.callback_group
+            if self._is_shutdown or not group.beginning_execution(entity):
+                entity._executor_event = False
+                self._progress()
+                return
+            with self._work_tracker:
+                try:
+                    try:
+                        work = take()
+                    except InvalidHandle:
+                        # Destroyed between becoming ready and being run.
+                        work = None
+                    entity._executor_event = False
+                    self._progress()
+                    if work is not None:
+                        result = work()
+                        if hasattr(result, "__await__"):
+                            await result
+                finally:
+                    entity._executor_event = False
+                    group.ending_execution(entity)
+                    self._progress()
+
+        task = Task(run, executor=self)
+        task._queued = True
+        with self._tasks_lock:
+            self._tasks.append((task, entity, node))
+        return task
+
+    @staticmethod
+    def _take_timer(timer: Any) -> Work | None:
+        handle = timer.handle
+        if handle.is_canceled() or timer.callback is None:
+            return None
+        handle.begin_call()
+        return lambda: await_or_execute(timer.callback)
+
+    @staticmethod
+    def _take_guard(guard: Any) -> Work | None:
+        guard._executor_triggered = False
+        return (lambda: await_or_execute(guard.callback)) if guard.callback is not None else None
+
+    @staticmethod
+    def _take_waitable(waitable: Any) -> Work | None:
+        data = waitable.take_data()
+        return lambda: waitable.execute(data)
+
+    def _ready(self, nodes: list[Node]) -> Iterator[tuple[Task, Any, Any]]:
+        """Claim and yield what is ready now, at most one callback per entity: events, timers, then
+        messages.
+        """
+        for node in nodes:
+            for waitable in list(node.waitables):
+                if self.can_execute(waitable) and waitable.is_ready(None):
+                    yield self._claim(waitable, node, lambda w=waitable: self._take_waitable(w))  # type: ignore[misc]
+        for node in nodes:
+            for timer in list(node.timers):
+                if not timer._destroyed and self.can_execute(timer) and timer.is_ready():
+                    yield self._claim(timer, node, lambda t=timer: self._take_timer(t))  # type: ignore[misc]
+            for entity in node.queued_entities():
+                if entity.has_work() and self.can_execute(entity):
+                    yield self._claim(entity, node, entity.take_work)
+            for guard in list(node.guards):
+                if guard._executor_triggered and self.can_execute(guard):
+                    yield self._claim(guard, node, lambda g=guard: self._take_guard(g))  # type: ignore[misc]
+
+    def _claim(
+        self, entity: Any, node: Node, take: Callable[[], Work | None]
+    ) -> tuple[Task, Any, Any]:
+        return self._make_task(entity, node, take), entity, node
+
+    def _pending_tasks(self, nodes: list[Node]) -> Iterator[tuple[Task, Any, Any]]:
+        """Tasks made by users and coroutines that gave way."""
+        with self._tasks_lock:
+            self._tasks = [entry for entry in self._tasks if not entry[0].done()]
+            pending = list(self._tasks)
+        for task, entity, node in reversed(pending):  # newest first, as rclpy does
+            if not task._queued and not task.done() and (node is None or node in nodes):
+                task._queued = True
+                yield task, entity, node
+
+    def _next_timer(self, nodes: list[Node]) -> int | None:
+        """Nanoseconds until the next timer that may run, or None."""
+        soonest = None
+        for node in nodes:
+            for timer in list(node.timers):
+                if timer._destroyed or not self.can_execute(timer):
+                    continue
+                left = timer.time_until_next_call()
+                if left is not None and (soonest is None or left < soonest):
+                    soonest = left
+        return soonest
+
+    def _wait(self, nodes: list[Node], timeout: int | None) -> None:
+        waiter = self._waiter
+        if waiter is None:
+            return
+        entities = [entity for node in nodes for entity in node.queued_entities()]
+        waiter.set_readers({e.reader for e in entities if e.reader is not None})
+        waiter.wait(timeout)
+        for entity in entities:
+            entity.drain()
+
+    def _wait_for_ready_callbacks(
+        self,
+        timeout_sec: float | TimeoutObject | None = None,
+        nodes: list[Node] | None = None,
+        condition: Callable[[], bool] = lambda: False,
+    ) -> Iterator[tuple[Task, Any, Any]]:
+        timeout = timeout_sec.timeout if isinstance(timeout_sec, TimeoutObject) else timeout_sec
+        limit = timeout_sec_to_nsec(timeout)
+        end = None if limit < 0 else time.monotonic_ns() + limit
+        found = False
+        while not found and not self._is_shutdown and not condition():
+            if not self._context.ok():
+                raise ExternalShutdownException()
+            used = self.get_nodes() if nodes is None else nodes
+            for item in self._pending_tasks(used):
+                found = True
+                yield item
+            wait = self._next_timer(used)
+            if any(e.has_work() and self.can_execute(e) for n in used for e in n.queued_entities()):
+                wait = 0
+            if end is not None:
+                left = max(end - time.monotonic_ns(), 0)
+                wait = left if wait is None else min(wait, left)
+            self._wait(used, wait)
+            if self._is_shutdown:
+                raise ShutdownException()
+            if not self._context.ok():
+                raise ExternalShutdownException()
+            for item in self._ready(used):
+                found = True
+                yield item
+            if not found and end is not None and time.monotonic_ns() >= end:
+                raise TimeoutException()
+        if self._is_shutdown:
+            raise ShutdownException()
+        if condition():
+            raise ConditionReachedException()
+
+    def wait_for_ready_callbacks(self, *args: Any, **kwargs: Any) -> tuple[Task, Any, Any]:
+        """The next task to run, with its entity and node. Arguments: timeout_sec, nodes, condition.
+
+        :raises TimeoutException: the timeout passed.
+        :raises ShutdownException: the executor was shut down.
+        :raises ExternalShutdownException: the context was shut down.
+        :raises ConditionReachedException: the condition holds.
+        """
+        while True:
+            if self._work is None or self._work_arguments != (args, kwargs):
+                self._work_arguments = (args, kwargs)
+                self._work = self._wait_for_ready_callbacks(*args, **kwargs)
+            try:
+                return next(self._work)
+            except StopIteration:
+                self._work = None
+
+    def __enter__(self) -> Executor:
+        return self
+
+    def __exit__(self, *args: object) -> None:
+        self.shutdown()
+
+
+class SingleThreadedExecutor(Executor):
+    """Runs callbacks in the thread that spins."""
+
+    def _progress(self) -> None:
+        pass
+
+    def _spin_once_impl(
+        self,
+        timeout_sec: float | TimeoutObject | None = None,
+        wait_condition: Callable[[], bool] = lambda: False,
+    ) -> None:
+        try:
+            task, _, _ = self.wait_for_ready_callbacks(timeout_sec, None, wait_condition)
+        except (ShutdownException, TimeoutException, ConditionReachedException):
+            return
+        task()
+        if task.done():
+            task.result()
+
+    def spin_once(self, timeout_sec: float | None = None) -> None:
+        self._spin_once_impl(timeout_sec)
+
+    def spin_once_until_future_complete(
+        self, future: Future, timeout_sec: float | TimeoutObject | None = None
+    ) -> None:
+        self._spin_once_impl(timeout_sec, future.done)
+
+
+class MultiThreadedExecutor(Executor):
+    """Runs callbacks in a pool of threads."""
+
+    def __init__(self, num_threads: int | None = None, *, context: Any = None) -> None:
+        """Make a pool of ``num_threads`` threads; default: the CPUs this process may use."""
+        super().__init__(context=context)
+        if num_threads is None:
+            affinity = getattr(os, "sched_getaffinity", None)
+            num_threads = (len(affinity(0)) if affinity else os.cpu_count()) or 2
+        if num_threads == 1:
+            warnings.warn(
+                "MultiThreadedExecutor is used with a single thread.\n"
+                "Use the SingleThreadedExecutor instead.",
+                stacklevel=2,
+            )
+        self._futures: list[Task] = []
+        self._executor = ThreadPoolExecutor(num_threads)
+
+    def _spin_once_impl(
+        self,
+        timeout_sec: float | TimeoutObject | None = None,
+        wait_condition: Callable[[], bool] = lambda: False,
+    ) -> None:
+        try:
+            task, _, _ = self.wait_for_ready_callbacks(timeout_sec, None, wait_condition)
+        except (
+            ExternalShutdownException,
+            ShutdownException,
+            TimeoutException,
+            ConditionReachedException,
+        ):
+            return
+        self._executor.submit(task)
+        self._futures.append(task)
+        for future in self._futures[:]:
+            if future.done():
+                self._futures.remove(future)
+                future.result()
+
+    def spin_once(self, timeout_sec: float | None = None) -> None:
+        self._spin_once_impl(timeout_sec)
+
+    def spin_once_until_future_complete(
+        self, future: Future, timeout_sec: float | TimeoutObject | None = None
+    ) -> None:
+        self._spin_once_impl(timeout_sec, future.done)
+
+    def shutdown(self, timeout_sec: float | None = None) -> bool:
+        finished = super().shutdown(timeout_sec)
+        self._executor.shutdown(wait=False)
+        return finished

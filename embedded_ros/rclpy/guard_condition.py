@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Guard conditions: callbacks that other threads can cause to run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from .exceptions import InvalidHandle
+from .utilities import get_default_context
+
+
+class GuardCondition:
+    """Runs its callback in the executor after :meth:`trigger`."""
+
+    def __init__(
+        self, callback: Callable[[], Any] | None, callback_group: Any, context: Any = None
+    ) -> None:
+        self._context = get_default_context() if context is None else context
+        self.callback = callback
+        self.callback_group = callback_group
+        self._executor_event = False
+        self._executor_triggered = False
+        self._destroyed = False
+        self._wake: Callable[[], None] | None = None
+
+    def trigger(self) -> None:
+        """Have the callback run once, from any thread.
+
+        :raises InvalidHandle: the guard condition was destroyed.
+        """
+        if self._destroyed:
+            raise InvalidHandle("cannot use Destroyable because destruction was requested")
+        self._executor_triggered = True
+        if self._wake is not None:
+            self._wake()
+
+    def destroy(self) -> None:
+        """Give up the guard condition."""
+        self._destroyed = True

@@ -1,0 +1,312 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The part of a node that makes, keeps and destroys publishers, subscriptions and timers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any
+
+from embedded_ros.interfaces.registry import registry
+from embedded_ros.transport.graph import NodeEntry, dds_type_name
+
+from .callback_groups import CallbackGroup, MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
+from .clock import Clock, ROSClock
+from .constants import S_TO_NS
+from .event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
+from .guard_condition import GuardCondition
+from .impl.queued import QueuedEntity
+from .impl.rcutils_logger import RcutilsLogger
+from .publisher import Publisher
+from .qos import QoSProfile
+from .subscription import Subscription
+from .timer import Rate, Timer
+from .type_support import check_is_valid_msg_type
+
+if TYPE_CHECKING:
+    from .context import Context
+
+
+class EntityHolder:
+    """What a node has made."""
+
+    _context: Context
+    _entry: NodeEntry
+    _clock: ROSClock
+    _logger: RcutilsLogger
+
+    def __init__(self) -> None:
+        self._publishers: list[Publisher] = []
+        self._subscriptions: list[Subscription] = []
+        self._clients: list[Any] = []
+        self._services: list[Any] = []
+        self._timers: list[Timer] = []
+        self._guards: list[GuardCondition] = []
+        self._waitables: list[Any] = []
+        self._default_callback_group: CallbackGroup = MutuallyExclusiveCallbackGroup()
+        self._rate_group = ReentrantCallbackGroup()
+
+    def _wake_executor(self) -> None:
+        raise NotImplementedError
+
+    def _full_name(self, name: str, service: bool = False, remap: bool = True) -> str:
+        raise NotImplementedError
+
+    @property
+    def publishers(self) -> Iterator[Publisher]:
+        """The publishers created here."""
+        yield from self._publishers
+
+    @property
+    def subscriptions(self) -> Iterator[Subscription]:
+        """The subscriptions created here."""
+        yield from self._subscriptions
+
+    @property
+    def clients(self) -> Iterator[Any]:
+        """The service clients created here."""
+        yield from self._clients
+
+    @property
+    def services(self) -> Iterator[Any]:
+        """The services created here."""
+        yield from self._services
+
+    @property
+    def timers(self) -> Iterator[Timer]:
+        """The timers created here."""
+        yield from self._timers
+
+    @property
+    def guards(self) -> Iterator[GuardCondition]:
+        """The guard conditions created here."""
+        yield from self._guards
+
+    @property
+    def waitables(self) -> Iterator[Any]:
+        """Everything else that the executor runs, QoS events included."""
+        yield from self._waitables
+
+    def queued_entities(self) -> list[QueuedEntity]:
+        """What is fed by readers, in the order in which executors serve it."""
+        return [*self._subscriptions, *self._clients, *self._services]
+
+    def add_waitable(self, waitable: Any) -> None:
+        """Have the executor run a :class:`~rclpy.waitable.Waitable`."""
+        self._waitables.append(waitable)
+        self._wake_executor()
+
+    def remove_waitable(self, waitable: Any) -> None:
+        """Have it run no longer."""
+        self._waitables.remove(waitable)
+        self._wake_executor()
+
+    @staticmethod
+    def _profile(qos_or_depth: QoSProfile | int) -> QoSProfile:
+        if isinstance(qos_or_depth, QoSProfile):
+            return qos_or_depth
+        if isinstance(qos_or_depth, int):
+            if qos_or_depth < 0:
+                raise ValueError("history depth must be greater than or equal to zero")
+            return QoSProfile(depth=qos_or_depth)
+        raise TypeError(f"Expected QoSProfile or int, but received {type(qos_or_depth)!r}")
+
+    def _announce(self, writer: Any = None, reader: Any = None, remove: bool = False) -> None:
+        """Tell the graph which endpoints this node has."""
+        for endpoint, known in ((writer, self._entry.writers), (reader, self._entry.readers)):
+            if endpoint is not None:
+                if not remove:
+                    known.append(endpoint.guid)
+                elif endpoint.guid in known:
+                    known.remove(endpoint.guid)
+        if self._context.ok():
+            self._context.graph.announce()
+
+    def create_publisher(
+        self,
+        msg_type: Any,
+        topic: str,
+        qos_profile: QoSProfile | int,
+        *,
+        callback_group: CallbackGroup | None = None,
+        event_callbacks: PublisherEventCallbacks | None = None,
+        qos_overriding_options: Any = None,
+        publisher_class: type[Publisher] = Publisher,
+    ) -> Publisher:
+        """Make a publisher; an int as QoS is the history depth.
+
+        :raises NoTypeSupportImportedException: ``msg_type`` is no message class.
+        :raises InvalidTopicNameException: the topic name is invalid.
+        """
+        profile = self._profile(qos_profile)
+        check_is_valid_msg_type(msg_type)
+        full = self._full_name(topic)
+        dds_topic = full[1:] if profile.avoid_ros_namespace_conventions else "rt" + full
+        peers = self._peer_qos(dds_topic, readers=True, profile=profile)
+        name = msg_type._spec_.name
+        writer = self._context.participant.create_writer(
+            dds_topic, dds_type_name(name), registry.type_hash(name), profile.decide(peers, True)
+        )
+        group = callback_group or self._default_callback_group
+        callbacks = event_callbacks or PublisherEventCallbacks()
+        publisher = publisher_class(
+            writer, msg_type, topic, full, profile, callbacks, group, self._logger
+        )
+        self._publishers.append(publisher)
+        self._waitables.extend(publisher.event_handlers)
+        self._announce(writer=writer)
+        self._wake_executor()
+        return publisher
+
+    def create_subscription(
+        self,
+        msg_type: Any,
+        topic: str,
+        callback: Callable[..., Any],
+        qos_profile: QoSProfile | int,
+        *,
+        callback_group: CallbackGroup | None = None,
+        event_callbacks: SubscriptionEventCallbacks | None = None,
+        qos_overriding_options: Any = None,
+        raw: bool = False,
+    ) -> Subscription:
+        """Make a subscription; the callback takes the message, or message and message info.
+
+        :raises NoTypeSupportImportedException: ``msg_type`` is no message class.
+        :raises InvalidTopicNameException: the topic name is invalid.
+        """
+        profile = self._profile(qos_profile)
+        check_is_valid_msg_type(msg_type)
+        full = self._full_name(topic)
+        dds_topic = full[1:] if profile.avoid_ros_namespace_conventions else "rt" + full
+        peers = self._peer_qos(dds_topic, readers=False, profile=profile)
+        name = msg_type._spec_.name
+        reader = self._context.participant.create_reader(
+            dds_topic, dds_type_name(name), registry.type_hash(name), profile.decide(peers, False)
+        )
+        group = callback_group or self._default_callback_group
+        callbacks = event_callbacks or SubscriptionEventCallbacks()
+        subscription = Subscription(
+            reader, msg_type, topic, full, callback, group, profile, raw, callbacks, self._logger
+        )
+        group.add_entity(subscription)
+        self._subscriptions.append(subscription)
+        self._waitables.extend(subscription.event_handlers)
+        self._announce(reader=reader)
+        self._wake_executor()
+        return subscription
+
+    def _peer_qos(self, dds_topic: str, readers: bool, profile: QoSProfile) -> list[Any]:
+        """QoS of the other side, looked up only for profiles that depend on it."""
+        if "BEST_AVAILABLE" not in (profile.reliability.name, profile.durability.name):
+            return []
+        endpoints = self._context.graph.endpoints()
+        return [e.qos for e in endpoints if e.topic == dds_topic and e.is_reader == readers]
+
+    def create_timer(
+        self,
+        timer_period_sec: float,
+        callback: Callable[..., Any] | None,
+        callback_group: CallbackGroup | None = None,
+        clock: Clock | None = None,
+        autostart: bool = True,
+    ) -> Timer:
+        """Make a timer with a period in seconds, on the node's clock unless another is given."""
+        group = callback_group or self._default_callback_group
+        timer = Timer(
+            callback,
+            group,
+            int(float(timer_period_sec) * S_TO_NS),
+            clock or self._clock,
+            context=self._context,
+            autostart=autostart,
+        )
+        timer._wake = self._wake_executor
+        group.add_entity(timer)
+        self._timers.append(timer)
+        self._wake_executor()
+        return timer
+
+    def create_guard_condition(
+        self, callback: Callable[..., Any], callback_group: CallbackGroup | None = None
+    ) -> GuardCondition:
+        """Make a guard condition."""
+        group = callback_group or self._default_callback_group
+        guard = GuardCondition(callback, group, context=self._context)
+        guard._wake = self._wake_executor
+        group.add_entity(guard)
+        self._guards.append(guard)
+        self._wake_executor()
+        return guard
+
+    def create_rate(self, frequency: float, clock: Clock | None = None) -> Rate:
+        """Make a rate in Hz.
+
+        :raises ValueError: the frequency is not positive.
+        """
+        if frequency <= 0:
+            raise ValueError(f"frequency must be > 0, got {frequency}")
+        timer = self.create_timer(1.0 / frequency, None, self._rate_group, clock)
+        return Rate(timer, context=self._context)
+
+    def _restart_timers(self, clock: Clock) -> None:
+        for timer in self._timers:
+            if timer.clock is clock:
+                timer.on_clock_jump()
+        self._wake_executor()
+
+    def _drop_events(self, entity: Any) -> None:
+        for handler in entity.event_handlers:
+            if handler in self._waitables:
+                self._waitables.remove(handler)
+
+    def destroy_publisher(self, publisher: Publisher) -> bool:
+        """Destroy a publisher; False when it is not of this node."""
+        if publisher not in self._publishers:
+            return False
+        self._publishers.remove(publisher)
+        self._drop_events(publisher)
+        self._announce(writer=publisher._writer, remove=True)
+        publisher.destroy()
+        self._wake_executor()
+        return True
+
+    def destroy_subscription(self, subscription: Subscription) -> bool:
+        """Destroy a subscription; False when it is not of this node."""
+        if subscription not in self._subscriptions:
+            return False
+        self._subscriptions.remove(subscription)
+        self._drop_events(subscription)
+        self._announce(reader=subscription._reader, remove=True)
+        subscription.destroy()
+        self._wake_executor()
+        return True
+
+    def _destroy(self, entity: Any, known: list[Any]) -> bool:
+        if entity not in known:
+            return False
+        known.remove(entity)
+        entity.destroy()
+        self._wake_executor()
+        return True
+
+    def destroy_timer(self, timer: Timer) -> bool:
+        """Destroy a timer; False when it is not of this node."""
+        return self._destroy(timer, self._timers)
+
+    def destroy_guard_condition(self, guard: GuardCondition) -> bool:
+        """Destroy a guard condition; False when it is not of this node."""
+        return self._destroy(guard, self._guards)
+
+    def destroy_rate(self, rate: Rate) -> bool:
+        """Destroy a rate and its timer; False when it is not of this node."""
+        rate.destroy()
+        return self.destroy_timer(rate._timer)
+
+    def _destroy_entities(self) -> None:
+        """Destroy everything that was made here."""
+        made: tuple[list[Any], ...]
+        made = (self._publishers, self._subscriptions, self._timers, self._guards)
+        for entity in [entity for known in made for entity in known]:
+            entity.destroy()
+        for known in (*made, self._waitables):
+            known.clear()

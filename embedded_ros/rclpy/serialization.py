@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Messages to CDR bytes and back."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from embedded_ros.interfaces.registry import registry
+
+from .type_support import check_is_valid_msg_type
+
+
+def serialize_message(message: Any) -> bytes:
+    """Encode a message, header included.
+
+    :raises TypeError: `message` is no ROS message.
+    """
+    check_is_valid_msg_type(type(message))
+    return registry.serializer(type(message))(message)
+
+
+def deserialize_message(serialized_message: bytes, message_type: Any) -> Any:
+    """Decode a message of a known type.
+
+    :raises embedded_ros.interfaces.cdr.CdrError: the bytes are no encoding of that type.
+    """
+    check_is_valid_msg_type(message_type)
+    return registry.deserializer(message_type)(bytes(serialized_message))

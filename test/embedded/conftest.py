@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Fixtures of the runtime's tests. All but the tests of internals hold for real rclpy too."""
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import embedded_ros
+
+ROOT = Path(__file__).parents[2]
+PROGRAMS = Path(__file__).parent / "programs"
+EMBEDDED = embedded_ros.enable([Path(__file__).parent / "interfaces"])
+
+if not EMBEDDED:
+    collect_ignore_glob = ["test_internal_*.py"]
+
+import rclpy  # noqa: E402
+from rclpy.executors import SingleThreadedExecutor  # noqa: E402
+
+
+@pytest.fixture
+def context():
+    """A context of its own, initialised without arguments."""
+    chosen = rclpy.Context()
+    rclpy.init(args=[], context=chosen)
+    yield chosen
+    chosen.try_shutdown()
+
+
+@pytest.fixture
+def make_node(context):
+    """Make nodes that are destroyed with the test."""
+    nodes = []
+
+    def make(name="tester", **kwargs):
+        nodes.append(rclpy.create_node(name, context=context, **kwargs))
+        return nodes[-1]
+
+    yield make
+    for node in nodes:
+        node.destroy_node()
+
+
+@pytest.fixture
+def node(make_node):
+    """One node."""
+    return make_node()
+
+
+@pytest.fixture
+def spin(context):
+    """Spin nodes until a condition holds; the limit is only there to end a failing test."""
+
+    def run(condition, *nodes, limit=15.0, executor=None):
+        own = executor or SingleThreadedExecutor(context=context)
+        for one in nodes:
+            own.add_node(one)
+        end = time.monotonic() + limit
+        try:
+            while not condition() and time.monotonic() < end:
+                own.spin_once(timeout_sec=0.05)
+        finally:
+            for one in nodes:
+                own.remove_node(one)
+            if executor is None:
+                own.shutdown()
+        return condition()
+
+    return run
+
+
+class Program:
+    """A test program in a process of its own."""
+
+    def __init__(self, name, *arguments, **environment):
+        path = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
+        self.process = subprocess.Popen(
+            [sys.executable, "-u", str(PROGRAMS / name), *arguments],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env={**os.environ, "PYTHONPATH": path, **environment},
+        )
+
+    def finish(self, limit=30):
+        """Exit code, standard output and standard error."""
+        try:
+            out, err = self.process.communicate(timeout=limit)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            out, err = self.process.communicate()
+            raise AssertionError(f"did not end in {limit} s\n{out}\n{err}") from None
+        return self.process.returncode, out, err
+
+    def wait_for_line(self, text):
+        """Read standard output until a line holds ``text``."""
+        for line in self.process.stdout:
+            if text in line:
+                return line
+        raise AssertionError(f"ended without {text!r}: {self.process.stderr.read()}")
+
+
+@pytest.fixture
+def program():
+    """Start test programs that are killed with the test."""
+    started = []
+
+    def start(name, *arguments, **environment):
+        started.append(Program(name, *arguments, **environment))
+        return started[-1]
+
+    yield start
+    for one in started:
+        if one.process.poll() is None:
+            one.process.kill()
+            one.process.wait()

@@ -1,0 +1,191 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Reading definitions, the import hook, and the discovery settings."""
+
+import importlib
+import subprocess
+import sys
+from pathlib import Path
+
+import embedded_sample_msgs.action
+import embedded_sample_msgs.srv
+import numpy as np
+import pytest
+from embedded_sample_msgs.msg import Everything
+
+import embedded_ros
+from embedded_ros.finder import InterfaceFinder
+from embedded_ros.interfaces.registry import Registry, package_name, registry
+from embedded_ros.interfaces.spec import DefinitionError, parse_message
+from embedded_ros.transport.cyclone_config import DiscoveryError, discovery_range, domain_xml
+from embedded_ros.transport.graph import dds_type_name, ros_type_name, split_topic
+
+ROOT = Path(__file__).parents[2]
+
+
+def test_constants_and_defaults_of_a_custom_type():
+    message = Everything()
+    assert (Everything.LIMIT, Everything.GREETING, Everything.HALF) == (7, "hello # world", 0.5)
+    assert message.flag is True
+    assert message.one == b"\x03"
+    assert (message.letter, message.small, message.medium) == (65, -5, 16)
+    assert message.big == -9_000_000_000
+    assert (message.single, message.double_value) == (1.5, 2.5)
+    assert message.text == 'say "hi"'
+    assert list(message.numbers) == [1, -2, 3]
+    assert np.array_equal(message.triple, [0.5, 1.5, 2.5])
+    assert message.names == ["a", "b"]
+    assert message.pair == ["", ""]
+    assert len(message.two_parts) == 2
+    assert message.two_parts[0] is not message.two_parts[1]
+    assert message.pose.pose.orientation.w == 1.0
+
+
+@pytest.mark.parametrize(
+    ("member", "value"),
+    [
+        ("short_text", "123456"),
+        ("few_parts", [1]),
+        ("two_parts", []),
+        ("bounded", [1.0, 2.0, 3.0]),
+        ("four", [1, 2, 3]),
+        ("four", [1, 2, 3, 256]),
+        ("pair", ["a"]),
+        ("flags", [1]),
+        ("raw", [b"ab"]),
+        ("wide", b"x"),
+    ],
+)
+def test_bounds_of_a_custom_type(member, value):
+    with pytest.raises(AssertionError, match=member):
+        setattr(Everything(), member, value)
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["float64", "float64[ x", "int32 x=1.5", "unknown! x", "bool flag maybe", "int8 9lives"],
+)
+def test_bad_definitions_name_the_line(line):
+    with pytest.raises(DefinitionError, match="pkg/msg/Bad, line 2"):
+        parse_message(f"int32 fine\n{line}\n", "pkg/msg/Bad")
+
+
+def test_services_and_actions_of_a_custom_package():
+    ask = embedded_sample_msgs.srv.Ask
+    assert ask.Request.LOUD == 1
+    assert ask.Request(question=Everything().two_parts[0]).question.kind == 0
+    assert ask.Response().answer == "none"
+    move = embedded_sample_msgs.action.Move
+    assert move.Goal(target=1.0).target == 1.0
+    assert (move.Result().reached, move.Feedback().done) == (0.0, 0.0)
+    assert list(move.Impl.FeedbackMessage.get_fields_and_field_types()) == ["goal_id", "feedback"]
+
+
+def test_a_package_is_named_by_its_manifest(tmp_path):
+    (tmp_path / "msg").mkdir()
+    (tmp_path / "package.xml").write_text("<package><name>from_manifest</name></package>")
+    (tmp_path / "msg" / "Thing.msg").write_text("int32 x 5\n")
+    own = Registry()
+    assert own.add_package(tmp_path) == "from_manifest"
+    assert own.names("from_manifest", "msg") == ["Thing"]
+    assert own.message_class("from_manifest/msg/Thing")().x == 5
+    (tmp_path / "package.xml").write_text("<package><name>no/name</name></package>")
+    with pytest.raises(DefinitionError, match="no/name"):
+        package_name(tmp_path)
+
+
+def test_enabling_again_changes_nothing():
+    assert embedded_ros.enable() is True
+    assert sum(isinstance(f, InterfaceFinder) for f in sys.meta_path) == 1
+    with pytest.raises(FileNotFoundError, match="nowhere"):
+        embedded_ros.enable(["nowhere"])
+
+
+def test_modules_carry_rclpys_names():
+    for name in ("rclpy.node", "rclpy.qos", "rclpy.executors", "rclpy.impl.rcutils_logger"):
+        assert importlib.import_module(name).__name__ == name
+    from rclpy.node import Node
+
+    assert Node.__module__ == "rclpy.node"
+
+
+def test_a_real_rclpy_is_left_alone(tmp_path):
+    (tmp_path / "rclpy").mkdir()
+    (tmp_path / "rclpy" / "__init__.py").write_text("REAL = True\n")
+    program = (
+        f"import sys; sys.path[:0] = [{str(tmp_path)!r}, {str(ROOT)!r}]\n"
+        "import embedded_ros\n"
+        "before = list(sys.meta_path)\n"
+        "assert embedded_ros.enable() is False\n"
+        "assert sys.meta_path == before\n"
+        "import rclpy\n"
+        "assert rclpy.REAL\n"
+        "assert not any(name.startswith('cyclonedds') for name in sys.modules)\n"
+    )
+    subprocess.run([sys.executable, "-c", program], check=True)
+
+
+def test_missing_dependencies_are_named():
+    program = (
+        f"import sys; sys.path.insert(0, {str(ROOT)!r})\n"
+        "import importlib.util as util\n"
+        "find = util.find_spec\n"
+        "util.find_spec = lambda name, *rest: None if name == 'cyclonedds' else find(name, *rest)\n"
+        "import embedded_ros\n"
+        "try:\n    embedded_ros.enable()\n"
+        "except embedded_ros.MissingDependencyError as error:\n    print(error)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], check=True, capture_output=True, text=True
+    )
+    assert "pip install 'cyclonedds" in done.stdout
+    assert "rosbags" not in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("environ", "expected"),
+    [
+        ({}, "SUBNET"),
+        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "localhost"}, "LOCALHOST"),
+        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"}, "OFF"),
+        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET", "ROS_LOCALHOST_ONLY": "1"}, "LOCALHOST"),
+        ({"ROS_LOCALHOST_ONLY": "0"}, "SUBNET"),
+    ],
+)
+def test_discovery_range(environ, expected):
+    assert discovery_range(environ) == expected
+
+
+def test_unknown_discovery_range_is_named():
+    with pytest.raises(DiscoveryError, match="'FAR'"):
+        discovery_range({"ROS_AUTOMATIC_DISCOVERY_RANGE": "far"})
+
+
+def test_domain_configuration():
+    local = domain_xml({"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"})
+    assert 'address="127.0.0.1"' in local
+    assert "<AllowMulticast>false</AllowMulticast>" in local
+    users = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "CYCLONEDDS_URI": "file:///mine.xml"}
+    assert domain_xml(users).endswith(",file:///mine.xml")
+    peers = domain_xml({"ROS_STATIC_PEERS": "10.0.0.1;robot.local"})
+    assert '<Peer address="10.0.0.1"/><Peer address="robot.local"/>' in peers
+    assert domain_xml({"ROS_AUTOMATIC_DISCOVERY_RANGE": "SYSTEM_DEFAULT"}) == ""
+
+
+def test_a_machine_with_nothing_but_loopback_uses_it(monkeypatch):
+    monkeypatch.setattr("embedded_ros.transport.cyclone_config.has_network", lambda: False)
+    assert 'address="127.0.0.1"' in domain_xml({})
+
+
+def test_names_on_the_wire():
+    assert dds_type_name("std_msgs/msg/String") == "std_msgs::msg::dds_::String_"
+    assert ros_type_name("std_msgs::msg::dds_::String_") == "std_msgs/msg/String"
+    assert ros_type_name("Other") == "Other"
+    assert split_topic("rt/a/b") == ("topic", "/a/b")
+    assert split_topic("rq/addRequest") == ("request", "/addRequest")
+    assert split_topic("plain") == ("other", "plain")
+
+
+def test_unknown_interfaces_are_key_errors():
+    for name in ("std_msgs/msg/No", "std_srvs/srv/No_Request", "nothing/msg/X"):
+        with pytest.raises(KeyError):
+            registry.spec(name)

@@ -1,0 +1,189 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Message classes: what rosidl's generated Python gives, with field checks on."""
+
+import array
+import copy
+import math
+import pickle
+
+import numpy as np
+import pytest
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+from geometry_msgs.msg import Point, Pose, PoseWithCovariance, Quaternion, TransformStamped
+from nav_msgs.msg import OccupancyGrid
+from rcl_interfaces.msg import IntegerRange, ParameterDescriptor
+from sensor_msgs.msg import Image, JointState, NavSatStatus
+from shape_msgs.msg import SolidPrimitive
+from std_msgs.msg import Bool, ColorRGBA, Float32, Float64MultiArray, Int8, String, UInt8, UInt16
+from std_srvs.srv import SetBool, Trigger
+from visualization_msgs.msg import Marker, MarkerArray
+
+
+def test_defaults_come_from_the_definition():
+    assert Quaternion() == Quaternion(x=0.0, y=0.0, z=0.0, w=1.0)
+    assert Pose().orientation.w == 1.0
+    assert NavSatStatus().status == -2
+    assert DiagnosticStatus().level == b"\x00"
+    assert String().data == ""
+    assert Marker().lifetime.sec == 0
+
+
+def test_members_do_not_share_state():
+    first, second = Pose(), Pose()
+    first.position.x = 1.0
+    assert second.position.x == 0.0
+    one, other = MarkerArray(), MarkerArray()
+    one.markers.append(Marker())
+    assert other.markers == []
+
+
+def test_constructor_takes_keywords_only():
+    assert Point(x=1.0).x == 1.0
+    with pytest.raises(TypeError):
+        Point(1.0, 2.0, 3.0)
+    with pytest.raises(AssertionError):
+        Point(q=1.0)
+
+
+def test_unknown_attributes_are_refused():
+    with pytest.raises(AttributeError):
+        Point().q = 1.0
+
+
+def test_constants_are_on_the_class_and_read_only():
+    assert Marker.ARROW == 0
+    assert Marker.DELETEALL == 3
+    assert Marker().LINE_STRIP == 4
+    assert DiagnosticStatus.ERROR == b"\x02"
+    with pytest.raises(AttributeError):
+        Marker.ARROW = 5
+
+
+def test_field_types_are_listed():
+    assert Point.get_fields_and_field_types() == {"x": "double", "y": "double", "z": "double"}
+    assert PoseWithCovariance.get_fields_and_field_types()["covariance"] == "double[36]"
+    assert JointState.get_fields_and_field_types()["name"] == "sequence<string>"
+    assert SolidPrimitive.get_fields_and_field_types()["dimensions"] == "sequence<double, 3>"
+    assert TransformStamped.get_fields_and_field_types()["header"] == "std_msgs/Header"
+    assert DiagnosticStatus.get_fields_and_field_types()["level"] == "octet"
+    assert Bool.get_fields_and_field_types()["data"] == "boolean"
+    types = ParameterDescriptor.get_fields_and_field_types()
+    assert types["integer_range"] == "sequence<rcl_interfaces/IntegerRange, 1>"
+
+
+@pytest.mark.parametrize(
+    ("message", "member", "value"),
+    [
+        (Point(), "x", 1),
+        (Point(), "x", "1.0"),
+        (Point(), "x", None),
+        (Int8(), "data", 128),
+        (Int8(), "data", -129),
+        (Int8(), "data", 1.0),
+        (UInt8(), "data", -1),
+        (UInt16(), "data", 65536),
+        (Bool(), "data", 1),
+        (String(), "data", b"x"),
+        (Float32(), "data", 1e39),
+        (DiagnosticStatus(), "level", 0),
+        (DiagnosticStatus(), "level", b"12"),
+        (DiagnosticStatus(), "values", [Point()]),
+        (Pose(), "position", Quaternion()),
+        (JointState(), "position", [1]),
+        (JointState(), "position", 1.0),
+        (JointState(), "position", array.array("f", [1.0])),
+        (JointState(), "name", "not a list"),
+        (JointState(), "name", [1]),
+        (PoseWithCovariance(), "covariance", [0.0] * 35),
+        (PoseWithCovariance(), "covariance", np.zeros(36, dtype=np.float32)),
+        (SolidPrimitive(), "dimensions", [1.0] * 4),
+        (ParameterDescriptor(), "integer_range", [IntegerRange(), IntegerRange()]),
+    ],
+)
+def test_wrong_values_are_refused_by_name(message, member, value):
+    before = copy.deepcopy(message)
+    with pytest.raises(AssertionError, match=member):
+        setattr(message, member, value)
+    assert message == before
+
+
+def test_numeric_sequences_are_arrays():
+    state = JointState(position=[1.0, 2.0], velocity=(3.0,))
+    assert state.position == array.array("d", [1.0, 2.0])
+    assert isinstance(state.velocity, array.array)
+    assert Image(data=bytes([1, 2])).data == array.array("B", [1, 2])
+    assert OccupancyGrid(data=[-1, 100]).data.typecode == "b"
+    assert Float64MultiArray().data == array.array("d")
+    own = array.array("d", [5.0])
+    state.effort = own
+    assert state.effort is own
+
+
+def test_fixed_numeric_arrays_are_numpy():
+    pose = PoseWithCovariance()
+    assert isinstance(pose.covariance, np.ndarray)
+    assert pose.covariance.dtype == np.float64
+    assert pose.covariance.shape == (36,)
+    pose.covariance = [float(i) for i in range(36)]
+    assert pose.covariance[35] == 35.0
+
+
+def test_float_members_take_infinity_and_nan():
+    assert math.isinf(Point(x=math.inf).x)
+    assert math.isnan(ColorRGBA(r=math.nan).r)
+
+
+def test_numpy_floats_are_floats_and_numpy_integers_are_not_integers():
+    assert Point(x=np.float64(2.5)).x == 2.5
+    with pytest.raises(AssertionError):
+        Int8(data=np.int8(1))
+
+
+def test_equality():
+    assert Point(x=1.0) == Point(x=1.0)
+    assert Point(x=1.0) != Point(x=2.0)
+    assert Point() != Quaternion()
+    changed = PoseWithCovariance()
+    changed.covariance = [1.0] * 36
+    assert changed != PoseWithCovariance()
+
+
+def test_messages_are_not_hashable():
+    with pytest.raises(TypeError):
+        hash(Point())
+
+
+def test_repr_names_package_and_members():
+    assert repr(Point(x=1.0)) == "geometry_msgs.msg.Point(x=1.0, y=0.0, z=0.0)"
+    assert repr(String(data="hi")) == "std_msgs.msg.String(data='hi')"
+    assert "position=[1.0, 2.0]" in repr(JointState(position=[1.0, 2.0]))
+    nested = repr(DiagnosticStatus(values=[KeyValue(key="a", value="b")]))
+    assert "values=[diagnostic_msgs.msg.KeyValue(key='a', value='b')]" in nested
+
+
+def test_copy_and_pickle():
+    marker = Marker(ns="a", points=[Point(x=1.0)], colors=[ColorRGBA(a=1.0)])
+    assert copy.deepcopy(marker) == marker
+    assert pickle.loads(pickle.dumps(marker)) == marker
+
+
+def test_services_group_their_messages():
+    assert SetBool.Request(data=True).data is True
+    response = Trigger.Response(success=True, message="done")
+    assert (response.success, response.message) == (True, "done")
+    with pytest.raises(NotImplementedError):
+        SetBool()
+
+
+def test_module_contents():
+    import std_msgs.msg
+    from std_msgs.msg._multi_array_layout import MultiArrayLayout
+
+    assert "Float64" in dir(std_msgs.msg)
+    assert MultiArrayLayout is std_msgs.msg.MultiArrayLayout
+    assert Time.__module__ == "builtin_interfaces.msg._time"
+    with pytest.raises(ImportError):
+        from std_msgs.msg import NoSuchMessage  # noqa: F401
+    with pytest.raises(ModuleNotFoundError):
+        import std_msgs.nothing
