@@ -159,7 +159,7 @@ def test_boxes_and_cylinders_touch(gripping, kind):
     probe.publish("objects", objects(item))
     state = probe.until(lambda: (s := newest(probe, "finger_1")).contacts and s, "a contact")
     assert {c.obstacle for c in state.contacts} == {kind}
-    probe.until(lambda: shown(probe.markers()[-1], "objects"))
+    probe.until(lambda: (m := probe.markers()) and shown(m[-1], "objects"), "the object shown")
     marker = shown(probe.markers()[-1], "objects")[0]
     assert marker.header.frame_id == "gripper/gripper_base"
     assert marker.type == (Marker.CUBE if kind == "box" else Marker.CYLINDER)
