@@ -146,12 +146,12 @@ def _message(problem: EquilibriumProblem, walk: Walk, stable: bool) -> str:
         if walk.met is not None:
             why = f"disks {walk.met[0]} and {walk.met[1]} meet beyond"
         elif walk.late:
-            why = f"the time limit of {problem.settings.time_limit:g} s ended the search at"
+            why = f"the time limit of {problem.settings.time_limit:g} s (of the CPU) ended the search at"
         else:
             why = "no equilibrium was found beyond"
         return (
-            f"{why} {walk.reached:.1%} of the way to the wanted pulls; the last good pose on the way"
-            f" is at {where}. Pull less, or give the obstacles more room."
+            f"{why} {walk.reached:.1%} of the way to the wanted pulls; the last good pose on it is"
+            f" at {where}. Pull less, or give the obstacles more room."
         )
     notes = []
     if walk.jumped:

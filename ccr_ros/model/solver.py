@@ -107,7 +107,9 @@ class FingerSolver:
                     float(pull),
                     f"less than the cable's length inside the finger, {rest:.6g} m",
                 )
-        walk = _Walk(self.problem, self._point, self._pulls, begin + self.settings.time_limit)
+        walk = _Walk(
+            self.problem, self._point, self._pulls, time.thread_time() + self.settings.time_limit
+        )
         if self._obstacles_changed:
             # Objects come and go at once, and the finger with them: that is no jump of its own.
             walk.run(self._pulls, watched=False)
@@ -224,7 +226,7 @@ class _Walk:
         self.pulls = target
 
     def _is_late(self) -> bool:
-        self.late = time.perf_counter() > self._deadline
+        self.late = time.thread_time() > self._deadline
         return self.late
 
     def _at_saddle(self) -> bool:

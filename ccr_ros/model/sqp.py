@@ -87,7 +87,7 @@ def solve_sqp(
     max_iterations: int,
     deadline: float,
 ) -> SqpResult:
-    """Minimise the energy within bounds from ``point``, until ``deadline`` (time.perf_counter)."""
+    """Minimise the energy within bounds from ``point``, until ``deadline`` (of time.thread_time)."""
     settings = problem.settings
     price, best = 10.0, np.inf
     for iteration in range(max_iterations):
@@ -96,7 +96,7 @@ def solve_sqp(
         error = point.residual + violation
         if point.residual <= settings.tolerance and violation <= settings.tolerance:
             return SqpResult(point, iteration, True)
-        found = _qp_step(point, slacks) if time.perf_counter() < deadline else None
+        found = _qp_step(point, slacks) if time.thread_time() < deadline else None
         if found is None:
             return SqpResult(point, iteration, False)
         step, multipliers = found

@@ -1,0 +1,256 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The pieces of the demo that need no ROS graph; test_demo_run.py runs the whole."""
+
+import io
+import os
+import socket
+
+import numpy as np
+import pytest
+
+from ccr_ros.demo import output
+from ccr_ros.demo.environment import free_domain, graph_environment, import_environment
+from ccr_ros.demo.measurements import Measurements
+from ccr_ros.demo.progress import Progress
+from ccr_ros.demo.script import BALL, GRIPPER_FILE, PullScript
+from ccr_ros.model import FingerSolver, InvalidFile, InvalidValue, load_gripper
+from ccr_ros.nodes.conversions import obstacle_from_body
+from ccr_ros.resources import find_config
+from ccr_ros.viz.figures import MissingMatplotlib
+
+FINGERS = ("finger_1", "finger_2", "finger_3")
+MS = 1_000_000  # ns
+
+
+# The script
+
+
+@pytest.fixture(params=[3.0, 18.0])
+def script(request):
+    return PullScript(FINGERS, request.param)
+
+
+def percents(script, finger, count=2001):
+    times = np.linspace(0.0, script.seconds, count)
+    return times, np.array([script.percent(finger, t) for t in times])
+
+
+def test_the_script_begins_and_ends_open(script):
+    for finger in FINGERS:
+        for time_ in (-1.0, 0.0, script.seconds, script.seconds + 1.0):
+            assert script.percent(finger, time_) == 0.0
+
+
+def test_pulls_reach_the_ball_and_stay_below_the_unstable_range(script):
+    for finger in FINGERS:
+        pulls = percents(script, finger)[1]
+        assert pulls.min() >= 0.0
+        assert 3.0 < pulls.max() <= 3.3
+
+
+def test_pulls_are_smooth(script):
+    for finger in FINGERS:
+        times, pulls = percents(script, finger)
+        step = times[1]
+        velocity = np.diff(pulls) / step
+        acceleration = np.diff(velocity) / step
+        # The steepest way is 3.1 % in 0.12 of the run: at most 1.875 and 5.774 times its mean
+        # velocity and acceleration, where a jump in velocity would show as 1 / step.
+        assert np.abs(velocity).max() <= 1.9 * 3.1 / (0.12 * script.seconds)
+        assert np.abs(acceleration).max() <= 5.8 * 3.1 / (0.12 * script.seconds) ** 2
+
+
+def test_the_last_finger_has_its_own_rhythm(script):
+    first, second, last = (percents(script, finger)[1] for finger in FINGERS)
+    assert np.array_equal(first, second)
+    assert np.argmax(last > 0) > np.argmax(first > 0)
+    assert last.max() < first.max()
+    assert last[np.nonzero(first)[0][-1]] == 0.0  # open again before the others
+
+
+def test_a_single_finger_closes_like_most(script):
+    alone = PullScript(("thumb",), script.seconds)
+    assert np.array_equal(percents(alone, "thumb")[1], percents(script, FINGERS[0])[1])
+
+
+def test_phases(script):
+    phases = [script.phase(t) for t in np.linspace(-0.1, script.seconds + 0.1, 200)]
+    changes = [p for i, p in enumerate(phases) if i == 0 or p != phases[i - 1]]
+    assert changes == ["open", "close", "hold", "release", "open"]
+
+
+@pytest.mark.parametrize("seconds", [2.9, 45.1, float("nan"), float("inf")])
+def test_times_out_of_range_are_refused(seconds):
+    with pytest.raises(InvalidValue, match=r"seconds.*>= 3 and <= 45"):
+        PullScript(FINGERS, seconds)
+
+
+def test_a_script_without_fingers_is_refused():
+    with pytest.raises(InvalidValue, match="at least one finger"):
+        PullScript((), 5.0)
+
+
+def test_along_the_script_all_poses_are_stable_and_every_finger_touches():
+    script = PullScript(FINGERS, 10.0)
+    for mounted, name in zip(load_gripper(find_config(GRIPPER_FILE)).fingers, FINGERS, strict=True):
+        assert mounted.finger.name == name
+        solver = FingerSolver(mounted.finger)
+        solver.obstacles = (obstacle_from_body(BALL).moved(mounted.base.inverse()),)
+        touched = 0
+        for time_ in np.linspace(0.0, script.seconds, 80):
+            solution = solver.solve(solver.rest_lengths * script.percent(name, time_) / 100)
+            assert solution.certificate.converged and solution.certificate.stable
+            assert not solution.certificate.branch_jump
+            touched += bool(solution.contacts)
+        assert 5 < touched < 60
+
+
+# Measurements
+
+
+def test_what_arrives_is_counted():
+    m = Measurements(["a", "b"])
+    m.add_state("a", 5 * MS, 6 * MS, solve_time=9.0)  # the rest pose, before any pulls
+    assert m.unanswered == ["a", "b"]
+    for k in range(10):
+        stamp = (100 + 20 * k) * MS
+        m.add_pulls("a", stamp)
+        m.add_pulls("b", stamp)
+        assert not m.caught_up
+        touching = {"ball"} if k in (2, 3, 6) else set()
+        force = 0.1 * k if touching else 0.0
+        m.add_state("a", stamp, stamp + 2 * MS, solve_time=1e-3, touching=touching, force=force)
+        m.add_state("b", stamp, stamp + 4 * MS, solve_time=3e-3, superseded=3, stable=k != 5)
+    assert m.caught_up and m.unanswered == []
+    m.add_state("a", 280 * MS, 999 * MS, solve_time=1.0, stale=True)  # the same pose once more
+    m.markers = 7
+    report = m.report(pulls_sent=25)
+    assert (report.pulls_sent, report.poses, report.superseded, report.lost) == (25, 20, 3, 2)
+    assert report.rate == pytest.approx(50.0)
+    assert report.latency == pytest.approx((3e-3, 4e-3))
+    assert report.solve_time == pytest.approx((2e-3, 3e-3))
+    assert (report.contacts, report.stale, report.unstable) == (2, 1, 1)
+    assert report.force == pytest.approx(0.6)
+    text = "\n".join(report.lines("N"))
+    for words in (
+        "25 sent; 20 answered by a pose, 3 superseded by newer ones, 2 lost on the way",
+        "50.0 per second",
+        "1 times not solved, 1 poses not stable",
+        "median 3.00 ms, 99th percentile 4.00 ms",
+        "2 made, up to 0.6 N",
+        "7 messages",
+    ):
+        assert words in text
+
+
+def test_a_single_pose_has_no_rate():
+    m = Measurements(["a"])
+    m.add_pulls("a", 0)
+    m.add_state("a", MS, 3 * MS, solve_time=1e-3)
+    report = m.report(pulls_sent=1)
+    assert report.rate == 0.0 and report.lost == 0
+    assert "every pose converged and stable" in "\n".join(report.lines("N"))
+
+
+# Progress
+
+
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
+
+
+def test_on_a_terminal_one_line_changes(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "30")
+    stream = Terminal()
+    progress = Progress(stream)
+    for k in range(5):
+        progress.update("close", f"{k} " + "x" * 100)
+    progress.say("done")
+    shown = stream.getvalue()
+    assert shown.count("\n") == 1 and shown.endswith("\r\x1b[Kdone\n")
+    assert all(len(part) < 30 for part in shown.split("\r\x1b[K"))
+
+
+def test_elsewhere_lines_are_few():
+    stream = io.StringIO()
+    progress = Progress(stream, sparse=60.0)
+    for phase in ("open", "close", "hold"):
+        for _ in range(10):
+            progress.update(phase, "text")
+    progress.say("done")
+    assert stream.getvalue().splitlines() == [
+        "open    text",
+        "close   text",
+        "hold    text",
+        "done",
+    ]
+
+
+# Environment
+
+
+def test_the_graph_is_the_demos_own_unless_the_user_says():
+    own = graph_environment({})
+    assert 1 <= int(own["ROS_DOMAIN_ID"]) <= 100
+    assert own["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "LOCALHOST"
+    assert graph_environment({"ROS_DOMAIN_ID": "7", "ROS_LOCALHOST_ONLY": "1"}) == {}
+    assert graph_environment(
+        {"ROS_DOMAIN_ID": " ", "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}
+    ).keys() == {"ROS_DOMAIN_ID"}
+
+
+def test_a_domain_in_use_is_not_taken(monkeypatch):
+    domain = free_domain()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.bind(("", 7400 + 250 * domain + 10))
+        monkeypatch.setattr(
+            "random.sample", lambda *_: [domain, *(d for d in range(1, 101) if d != domain)]
+        )
+        assert free_domain() != domain
+
+
+def test_children_import_this_package():
+    path = import_environment({"PYTHONPATH": "/elsewhere"})["PYTHONPATH"].split(os.pathsep)
+    assert os.path.isfile(os.path.join(path[0], "ccr_ros", "demo", "script.py"))
+    assert path[1:] == ["/elsewhere"]
+    assert os.pathsep not in import_environment({})["PYTHONPATH"]
+
+
+# Output
+
+
+def test_the_folder_is_made_and_old_files_go(tmp_path):
+    folder = tmp_path / "a" / "b"
+    output.prepare_folder(folder)
+    (folder / output.STRIP).write_text("old")
+    (folder / "mine.txt").write_text("stays")
+    output.prepare_folder(folder)
+    assert [path.name for path in folder.iterdir()] == ["mine.txt"]
+
+
+@pytest.mark.parametrize("below", ["", "inner"])
+def test_a_file_in_the_way_is_reported(tmp_path, below):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InvalidFile, match="cannot be"):
+        output.prepare_folder(tmp_path / "file" / below)
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write all")
+def test_a_folder_without_permission_is_reported(tmp_path):
+    tmp_path.chmod(0o500)
+    with pytest.raises(InvalidFile, match="Permission denied"):
+        output.prepare_folder(tmp_path)
+
+
+def test_without_matplotlib_the_strip_is_left_out(tmp_path, monkeypatch):
+    def missing(*_):
+        raise MissingMatplotlib
+
+    for writer in ("save_recording", "write_replay"):
+        monkeypatch.setattr(output, writer, lambda recording, path: path)
+    monkeypatch.setattr(output, "write_strip", missing)
+    said = []
+    paths = output.write_files(tmp_path, None, said.append)
+    assert [path.name for path in paths] == [output.RECORDING, output.REPLAY]
+    assert len(said) == 1 and "strip.png" in said[0] and "matplotlib" in said[0]
