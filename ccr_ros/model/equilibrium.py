@@ -109,13 +109,17 @@ class Linearization:
     """First derivatives at an `Evaluation`.
 
     Attributes:
+        twists: (N, 6) the rod's twists per scaled coordinate.
         points: (P, 3, N) Jacobian of all points.
         spans: (S, 3, N) Jacobian of the span vectors.
+        stretch: (S, N) Jacobian of the span lengths.
         lengths: (C, N) Jacobian of the cable lengths.
     """
 
+    twists: np.ndarray
     points: np.ndarray
     spans: np.ndarray
+    stretch: np.ndarray
     lengths: np.ndarray
 
 
@@ -147,8 +151,7 @@ class EquilibriumProblem:
             for i in range(len(pts) - 1)
         ]
         self.span_cable = np.array([s[0] for s in spans])
-        self._span_start = np.array([s[1] for s in spans])
-        self._span_end = np.array([s[2] for s in spans])
+        start, end = np.array([s[1] for s in spans]), np.array([s[2] for s in spans])
         groups = (
             self.span_cable
             if self.settings.cable_model == "frictionless"
@@ -160,8 +163,8 @@ class EquilibriumProblem:
         self._span_group = groups
         # +1 at a span's end, -1 at its start
         self._incidence = np.zeros((len(spans), len(self.points.disk)))
-        self._incidence[np.arange(len(spans)), self._span_end] = 1.0
-        self._incidence[np.arange(len(spans)), self._span_start] = -1.0
+        self._incidence[np.arange(len(spans)), end] = 1.0
+        self._incidence[np.arange(len(spans)), start] = -1.0
         self._gather = (groups[None, :] == np.arange(groups.max() + 1)[:, None]).astype(float)
 
         self._point_arc = self.points.disk * k
@@ -171,19 +174,24 @@ class EquilibriumProblem:
         self._scale = np.tile(self.coordinate_scale, self.arcs)
         self.largest_scale = float(self._scale.max())
         self.fixed = self.points.disk == 0  # points that do not move
-        self._scale_pairs = np.outer(self._scale, self._scale)
+        self._lever = np.zeros((len(self.points.disk), 3, 6))  # of dx = w x x + v, to be filled
+        self._lever[:, 0, 3] = self._lever[:, 1, 4] = self._lever[:, 2, 5] = 1.0
+        # The first group of each cable: its base end, where its tension is felt.
+        self.base_group = np.array(
+            [int(np.argmax(self.group_cable == j)) for j in range(len(finger.cables))]
+        )
         self.obstacles: tuple[Obstacle, ...] = finger.obstacles
         self.rest = self.evaluate(np.zeros(self.size))
         self.rest_lengths = np.bincount(
             self.group_cable, self.rest.lengths, minlength=len(finger.cables)
         )
+        self._shares = self.rest.lengths / self.rest_lengths[self.group_cable] / finger.length
 
     # -- constraint bounds -----------------------------------------------------------------
 
     def length_bounds(self, pulls: np.ndarray) -> np.ndarray:
         """Upper bounds (C,) of the cable (or span) lengths, in units of L, for pulls (m,) [m]."""
-        share = self.rest.lengths / self.rest_lengths[self.group_cable]
-        return self.rest.lengths - share * (pulls / self.finger.length)[self.group_cable]
+        return self.rest.lengths - self._shares * pulls[self.group_cable]
 
     # -- evaluation ------------------------------------------------------------------------
 
@@ -191,35 +199,37 @@ class EquilibriumProblem:
         """Evaluate pose and constraints at y (N,)."""
         z = self._z_rest + self.coordinate_scale * y.reshape(self.arcs, -1)
         rod = self.rod.state(z)
-        frames, centres = rod.rotations[self._point_arc], rod.positions[self._point_arc]
-        points = centres + (frames @ self.points.offset[:, :, None])[:, :, 0]
-        vectors = points[self._span_end] - points[self._span_start]
+        # A disk's points lie in its x-y plane.
+        frames, offset = rod.rotations[self._point_arc], self.points.offset
+        points = rod.positions[self._point_arc]
+        points += frames[:, :, 0] * offset[:, 0:1] + frames[:, :, 1] * offset[:, 1:2]
+        vectors = self._incidence @ points
         span_lengths = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))
         spans = vectors / np.maximum(span_lengths, 1e-12)[:, None]
-        metres = points * self.finger.length
         distances = np.empty((len(self.obstacles), len(points)))
-        for i, obstacle in enumerate(self.obstacles):
-            distances[i] = obstacle.signed_distance(metres)
-        distances /= self.finger.length
+        if self.obstacles:
+            metres = points * self.finger.length
+            for i, obstacle in enumerate(self.obstacles):
+                distances[i] = obstacle.signed_distance(metres)
+            distances /= self.finger.length
         return Evaluation(
             y, z, rod, points, spans, span_lengths, self._gather @ span_lengths, distances
         )
 
     def linearize(self, at: Evaluation) -> Linearization:
         """First derivatives at an evaluation."""
-        # dx = velocity + omega x x: one product for all points and coordinates
-        x = at.points
-        lever = np.zeros((len(x), 3, 6))
-        lever[:, 0, 1], lever[:, 0, 2] = x[:, 2], -x[:, 1]
-        lever[:, 1, 0], lever[:, 1, 2] = -x[:, 2], x[:, 0]
-        lever[:, 2, 0], lever[:, 2, 1] = x[:, 1], -x[:, 0]
-        lever[:, 0, 3] = lever[:, 1, 4] = lever[:, 2, 5] = 1.0
-        scaled = at.rod.twists * self._scale[:, None]
-        jacobian = (lever.reshape(-1, 6) @ scaled.T).reshape(len(x), 3, self.size)
-        jacobian *= self._moves
-        spans = jacobian[self._span_end] - jacobian[self._span_start]
-        lengths = self._gather @ (at.spans[:, None, :] @ spans)[:, 0, :]
-        return Linearization(jacobian, spans, lengths)
+        # One product for all points and coordinates.
+        x, y, z = at.points.T
+        lever = self._lever
+        lever[:, 0, 1], lever[:, 0, 2] = z, -y
+        lever[:, 1, 0], lever[:, 1, 2] = -z, x
+        lever[:, 2, 0], lever[:, 2, 1] = y, -x
+        twists = at.rod.twists * self._scale[:, None]
+        points = (lever.reshape(-1, 6) @ twists.T).reshape(len(x), 3, self.size)
+        points *= self._moves
+        spans = (self._incidence @ points.reshape(len(x), -1)).reshape(-1, 3, self.size)
+        stretch = (at.spans[:, None, :] @ spans)[:, 0, :]
+        return Linearization(twists, points, spans, stretch, self._gather @ stretch)
 
     def contact_rows(
         self, at: Evaluation, first: Linearization, pairs: np.ndarray
@@ -255,27 +265,23 @@ class EquilibriumProblem:
         gradient = self._incidence.T @ (tension[:, None] * at.spans)
 
         scale = np.sqrt(np.maximum(tension, 0.0) / np.maximum(at.span_lengths, 1e-12))
-        along = at.spans[:, None, :] @ first.spans  # (S, 1, N)
-        across = (first.spans - at.spans[:, :, None] * along) * scale[:, None, None]
+        across = first.spans - at.spans[:, :, None] * first.stretch[:, None, :]
+        across *= scale[:, None, None]
         across = across.reshape(-1, self.size)
         hessian = across.T @ across
 
         pressed = forces > 0
-        if pressed.any():
+        if len(forces) and pressed.any():
             index, force = pairs[pressed, 1], forces[pressed]
             np.subtract.at(gradient, index, force[:, None] * normals[pressed])
             rows = first.points[index]
             bent = (force[:, None, None] * curvatures[pressed]) @ rows
             hessian -= rows.reshape(-1, self.size).T @ bent.reshape(-1, self.size)
 
-        total, moment = self._beyond(at.points, gradient)
-        bending = self.rod.curvature_hessian(at.z, at.rod, total, moment)
-        bending *= self._scale_pairs
-        hessian += bending
+        moments = (gradient[:, :, None] * at.points[:, None, :]).reshape(-1, 9)
+        loads = self._carried @ np.concatenate([gradient, moments], axis=1)
+        hessian += self.rod.curvature_hessian(
+            at.z, at.rod, first.twists, self.coordinate_scale, loads
+        )
         hessian.flat[:: self.size + 1] += 1.0  # the elastic energy, 1/2 y.y
         return hessian
-
-    def _beyond(self, points: np.ndarray, gradient: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Sums of F and of F x^T over the points beyond the start of each arc."""
-        moments = (gradient[:, :, None] * points[:, None, :]).reshape(-1, 9)
-        return self._carried @ gradient, (self._carried @ moments).reshape(-1, 3, 3)

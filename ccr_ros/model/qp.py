@@ -72,12 +72,16 @@ def _held(s: np.ndarray, t: np.ndarray, active: np.ndarray) -> np.ndarray | None
     """The multipliers if exactly ``active`` are positive; None if that is not the solution."""
     index = np.flatnonzero(active)
     multipliers = np.zeros(len(t))
-    if len(index):
+    if len(index) == 1:
+        i = index[0]
+        multipliers[i] = -t[i] / s[i, i] if s[i, i] > 0 else -1.0
+    elif len(index):
         try:
-            multipliers[index] = np.linalg.solve(s[np.ix_(index, index)], -t[index])
+            multipliers[index] = np.linalg.solve(s[index[:, None], index], -t[index])
         except np.linalg.LinAlgError:
             return None
+    if multipliers.min() < 0:
+        return None
     slack = s @ multipliers + t
     slack[index] = 0.0
-    tolerance = 1e-12 * max(1.0, float(np.abs(t).max()))
-    return multipliers if multipliers.min() >= 0 and slack.min() >= -tolerance else None
+    return multipliers if slack.min() >= -1e-12 * max(1.0, float(np.abs(t).max())) else None

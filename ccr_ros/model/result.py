@@ -10,7 +10,7 @@ import numpy as np
 
 from .equilibrium import EquilibriumProblem
 from .solution import Certificate, Contact, Solution
-from .sqp import KktPoint
+from .sqp import ACTIVE, KktPoint
 
 _STABLE = 1e-6  # a reduced Hessian with an eigenvalue below this is at a branch point, or past it
 
@@ -39,6 +39,21 @@ def softest_direction(point: KktPoint) -> tuple[float, np.ndarray]:
     return float(values[0]), null @ vectors[:, 0]
 
 
+def _smallest_eigenvalue(point: KktPoint) -> float:
+    """Smallest eigenvalue of the reduced Hessian, without the null space's basis.
+
+    Projected with P = 1 - Q Q', Q an orthonormal basis of the active gradients, and with Q's own
+    space raised out of the way, the Hessian has the reduced one's eigenvalues as its smallest.
+    """
+    rows, hessian = point.rows[point.active], point.hessian
+    if len(rows):
+        q = np.linalg.qr(rows.T)[0]
+        half = hessian @ q
+        raised = q.T @ half + np.eye(q.shape[1]) * (1.0 + float(np.abs(hessian).sum(axis=1).max()))
+        hessian = hessian - half @ q.T - q @ half.T + q @ raised @ q.T
+    return float(np.linalg.eigvalsh(hessian)[0])
+
+
 def _null_space(point: KktPoint) -> np.ndarray:
     rows = point.rows[point.active]
     if not len(rows):
@@ -54,12 +69,7 @@ def make_solution(
     finger, at, length = problem.finger, point.at, problem.finger.length
     force_unit = finger.bending_stiffness / length**2
     disks = np.arange(finger.segments + 1) * problem.settings.arcs_per_segment
-    # The base end of a cable is where its tension is felt (all spans alike when frictionless).
-    base_group = np.array(
-        [np.flatnonzero(problem.group_cable == j)[0] for j in range(len(finger.cables))]
-    )
-    null = _null_space(point)
-    eigenvalue = float(np.linalg.eigvalsh(null.T @ point.hessian @ null)[0])
+    eigenvalue = _smallest_eigenvalue(point)
     z = at.z / problem.rod_step
     arcs = (finger.segments, problem.settings.arcs_per_segment, problem.rod.order + 1, 3)
     metres = at.points * length
@@ -87,7 +97,7 @@ def make_solution(
         frames=at.rod.rotations[disks],
         cables={n: metres[i] for n, i in zip(names, problem.points.cable, strict=True)},
         antagonists={n: metres[i] for n, i in zip(names, problem.points.antagonist, strict=True)},
-        tensions=np.where(point.active[base_group], point.tensions[base_group], 0.0) * force_unit,
+        tensions=_carried(point.tensions)[problem.base_group] * force_unit,
         contacts=_contacts(problem, point, force_unit),
         energy=0.5 * float(at.y @ at.y) * finger.bending_stiffness / length,
         curvature=z.reshape(arcs) / length,
@@ -95,12 +105,16 @@ def make_solution(
     )
 
 
+def _carried(tensions: np.ndarray) -> np.ndarray:
+    return np.where(tensions > ACTIVE, tensions, 0.0)
+
+
 def _errors(problem: EquilibriumProblem, point: KktPoint, pulls: np.ndarray) -> tuple[float, float]:
     over = point.at.lengths - problem.length_bounds(pulls)
     error = np.where(point.tensions > 0, np.abs(over), np.maximum(over, 0.0))
-    inside = np.maximum(-point.at.distances, 0.0)[:, problem.points.disk > 0]
+    inside = -point.at.distances[:, ~problem.fixed]
     length = problem.finger.length
-    return float(error.max(initial=0.0)) * length, float(inside.max(initial=0.0)) * length
+    return float(error.max()) * length, max(0.0, float(inside.max(initial=0.0))) * length
 
 
 def _contacts(problem: EquilibriumProblem, point: KktPoint, unit: float) -> tuple[Contact, ...]:
@@ -146,7 +160,8 @@ def _message(problem: EquilibriumProblem, walk: Walk, stable: bool) -> str:
         if walk.met is not None:
             why = f"disks {walk.met[0]} and {walk.met[1]} meet beyond"
         elif walk.late:
-            why = f"the time limit of {problem.settings.time_limit:g} s (of the CPU) ended the search at"
+            limit = f"{problem.settings.time_limit:g} s"
+            why = f"the time limit of {limit} (of the CPU) ended the search at"
         else:
             why = "no equilibrium was found beyond"
         return (

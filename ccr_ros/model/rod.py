@@ -38,6 +38,18 @@ def _stumpff(t: ca.SX, first: int) -> ca.SX:
     return total
 
 
+def _arms() -> np.ndarray:
+    """The linear map (12, 18) of (F, M) to the (6, 3) matrix of (w, v) -> M w - tr M w + v x F."""
+    columns = []
+    for unit in np.eye(12):
+        force, moment = unit[:3], unit[3:].reshape(3, 3)
+        columns.append(np.vstack([moment - np.trace(moment) * _EYE, skew(force)]).ravel())
+    return np.array(columns)
+
+
+_ARMS = _arms()
+
+
 class _Arc:
     """Rotation and translation along one arc as functions of z = (h a, h b) or (h a).
 
@@ -189,39 +201,44 @@ class Rod:
         return RodState(rotations, positions, self._chain.outputs[1].reshape(-1, 6).copy())
 
     def curvature_hessian(
-        self, z: np.ndarray, state: RodState, forces: np.ndarray, moments: np.ndarray
+        self,
+        z: np.ndarray,
+        state: RodState,
+        scaled: np.ndarray,
+        scale: np.ndarray,
+        loads: np.ndarray,
     ) -> np.ndarray:
-        """Second derivative (N, N) of sum_k F_k . x_k with the F_k held fixed.
+        """Second derivative (N, N) of sum_k F_k . x_k in scaled coordinates, the F_k held fixed.
 
         Args:
             z: Arc coordinates.
             state: Their `RodState`.
-            forces: (E, 3) sum of the F_k acting on points beyond each arc's start.
-            moments: (E, 3, 3) sum of F_k x_k^T over the same points.
+            scaled: (N, 6) its twists, per scaled coordinate.
+            scale: (size,) what an arc's scaled coordinates are multiplied by to give z.
+            loads: (E, 12) sums of F_k, and of F_k x_k^T, over the points beyond each arc's start.
 
         For coordinates of two arcs e before f, d2x = omega_e x (dx/df), a rotation of everything
-        beyond e; for two of the same arc the arc's own second derivatives, contracted.
+        beyond e, contracted to omega_e . (v_f x F + (M' - tr M) omega_f), M = sum F x^T; for two
+        of the same arc the arc's own second derivatives, contracted.
         """
-        omega, velocity = state.twists[:, :3], state.twists[:, 3:]
-        total = np.repeat(forces, self.size, axis=0)
-        inertia = moments - np.einsum("eii->e", moments)[:, None, None] * _EYE
-        arm = (omega.reshape(self.arcs, self.size, 3) @ inertia).reshape(-1, 3)
-        arm += cross(velocity, total)
-        hessian = omega @ arm.T
+        arms = (loads @ _ARMS).reshape(-1, 6, 3)
+        arm = (scaled.reshape(self.arcs, self.size, 6) @ arms).reshape(-1, 3)
+        hessian = scaled[:, :3] @ arm.T
         hessian *= self._earlier
         hessian += hessian.T.copy()
 
-        before, after = state.rotations[:-1], state.rotations[1:]
-        lever = moments - forces[:, :, None] * state.positions[1:, None, :]
-        local = before.transpose(0, 2, 1) @ lever @ after
+        force, moment = loads[:, None, :3], loads[:, 3:].reshape(-1, 3, 3)
+        before = state.rotations[:-1]
+        lever = moment - loads[:, :3, None] * state.positions[1:, None, :]
+        local = before.transpose(0, 2, 1) @ lever @ state.rotations[1:]
         self._second.inputs[0][:] = z.ravel()
-        self._second.inputs[1][:] = (forces[:, None, :] @ before).ravel()
+        self._second.inputs[1][:] = (force @ before).ravel()
         self._second.inputs[2][:] = local.transpose(0, 2, 1).ravel()
         self._second()
-        blocks = hessian.reshape(self.arcs, self.size, self.arcs, self.size)
-        blocks[self._diagonal, :, self._diagonal, :] += self._second.outputs[0].reshape(
-            -1, self.size, self.size
-        )
+        blocks = self._second.outputs[0].reshape(-1, self.size, self.size)
+        hessian.reshape(self.arcs, self.size, self.arcs, self.size)[
+            self._diagonal, :, self._diagonal, :
+        ] += blocks * (scale[:, None] * scale)
         return hessian
 
 

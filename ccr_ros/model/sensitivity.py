@@ -53,13 +53,11 @@ def sensitivity(problem: EquilibriumProblem, point: KktPoint) -> Sensitivity:
         solved = np.linalg.lstsq(system, right, rcond=None)[0]
     dy = solved[:n]
     disks = (point.first.points[problem.points.backbone] @ dy) * finger.length
-    scale = np.tile(problem.coordinate_scale, problem.arcs)
-    turn = (point.at.rod.twists[:, :3] * scale[:, None]).T @ dy
+    turn = point.first.twists[:, :3].T @ dy
     tensions = np.zeros((groups, count))
     tensions[active[taut]] = solved[n:][taut]
-    base = np.array([np.flatnonzero(problem.group_cable == j)[0] for j in range(count)])
     return Sensitivity(
         tip=np.concatenate([disks[-1], turn]),
         disks=disks,
-        tensions=tensions[base] * finger.bending_stiffness / finger.length**2,
+        tensions=tensions[problem.base_group] * finger.bending_stiffness / finger.length**2,
     )

@@ -19,7 +19,11 @@ from .qp import solve_multipliers
 
 _BAND = 0.1  # points nearer to an obstacle than this (units of L) enter the QP
 _AUGMENT = 10.0  # weight of the active constraints' augmentation, in units of the rod's stiffness
-_ACTIVE = 1e-9  # multipliers (T L^2 / EI) above this carry force
+ACTIVE = 1e-9  # multipliers (T L^2 / EI) above this carry force
+
+
+_NO_PAIRS = np.empty((0, 2), dtype=int)
+_NO_NORMALS, _NO_CURVATURES, _NO_FORCES = np.empty((0, 3)), np.empty((0, 3, 3)), np.empty(0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +65,7 @@ class KktPoint:
     @property
     def active(self) -> np.ndarray:
         """(C + c,) constraints that carry force."""
-        return self.multipliers > _ACTIVE
+        return self.multipliers > ACTIVE
 
     def slacks(self, bounds: Bounds) -> np.ndarray:
         """(C + c,) bound less value: negative where a constraint is violated."""
@@ -87,7 +91,7 @@ def solve_sqp(
     max_iterations: int,
     deadline: float,
 ) -> SqpResult:
-    """Minimise the energy within bounds from ``point``, until ``deadline`` (of time.thread_time)."""
+    """Minimise the energy within bounds from ``point``, until the thread's time is ``deadline``."""
     settings = problem.settings
     price, best = 10.0, np.inf
     for iteration in range(max_iterations):
@@ -115,25 +119,31 @@ def derive(
 ) -> KktPoint:
     """Return the KKT point of a pose with multipliers: all derivatives and the residual."""
     first = problem.linearize(at)
-    near = (at.distances < _BAND) | (forces > 0)
-    near[:, problem.fixed] = False
-    pairs = np.argwhere(near)
+    pairs = _candidates(problem, at, forces)
+    normals, curvatures, pressing = _NO_NORMALS, _NO_CURVATURES, _NO_FORCES
+    rows, values, multipliers = first.lengths, at.lengths, tensions
     if len(pairs):
         index = pairs[:, 0], pairs[:, 1]
         contact, normals, curvatures = problem.contact_rows(at, first, pairs)
-        rows = np.concatenate([first.lengths, contact])
-        values = np.concatenate([at.lengths, -at.distances[index]])
         pressing = forces[index]
-    else:
-        normals, curvatures, pressing = np.empty((0, 3)), np.empty((0, 3, 3)), np.empty(0)
-        rows, values = first.lengths, at.lengths
-    multipliers = np.concatenate([tensions, pressing])
+        rows = np.concatenate([rows, contact])
+        values = np.concatenate([values, -at.distances[index]])
+        multipliers = np.concatenate([tensions, pressing])
     hessian = problem.hessian(at, first, tensions, pairs, normals, curvatures, pressing)
     unbalanced = np.abs(at.y + multipliers @ rows).max()
     residual = float(unbalanced / max(1.0, np.abs(at.y).max()))
     return KktPoint(
         at, first, tensions, forces, pairs, normals, rows, values, multipliers, hessian, residual
     )
+
+
+def _candidates(problem: EquilibriumProblem, at: Evaluation, forces: np.ndarray) -> np.ndarray:
+    """Pairs (c, 2) of obstacle and point that are near each other or press on each other."""
+    if not problem.obstacles:
+        return _NO_PAIRS
+    near = (at.distances < _BAND) | (forces > 0)
+    near[:, problem.fixed] = False
+    return np.argwhere(near)
 
 
 def _violation(point: KktPoint, slacks: np.ndarray) -> float:
