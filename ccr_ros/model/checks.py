@@ -99,6 +99,15 @@ def name(place: str, value: Any) -> str:
     return value
 
 
+def label(place: str, value: Any) -> str:
+    """Return ``value`` as a name for people: 1 to 64 printable characters, no blanks around it."""
+    if not isinstance(value, str) or not 0 < len(value) <= 64 or value != value.strip():
+        raise InvalidValue(place, value, "a text of 1 to 64 characters without blanks around it")
+    if not value.isprintable():
+        raise InvalidValue(place, value, "a text of printable characters")
+    return value
+
+
 def quaternion(place: str, value: Any) -> np.ndarray:
     """Return ``value`` (x, y, z, w) as a read-only unit quaternion; within 1 % of unit length."""
     array = vector(place, value, 4)

@@ -182,7 +182,7 @@ def _obstacle(entry: Any, index: int) -> Obstacle:
     cls, needs, may = _OBSTACLES[kind]
     values = _mapping(entry, needs | {"type"}, may | {"name"})
     del values["type"]
-    values["name"] = checks.name("name", values.get("name", f"{kind}_{index}"))
+    values["name"] = checks.label("name", values.get("name", f"{kind}_{index}"))
     return cls(**values)
 
 

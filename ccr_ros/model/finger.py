@@ -91,7 +91,7 @@ class Finger:
         def put(key: str, value: Any) -> None:
             object.__setattr__(self, key, value)
 
-        put("name", checks.name("name", self.name))
+        put("name", checks.label("name", self.name))
         put("length", checks.real("length", self.length, low=_TINY, high=_HUGE, unit="m"))
         put("segments", checks.integer("segments", self.segments, low=2, high=MAX_SEGMENTS))
         radius = checks.real(
