@@ -3,27 +3,15 @@
 
 import os
 import random
-import socket
 
 from hypothesis import settings
 
+from ccr_ros.demo.environment import DOMAINS, is_free
 from ccr_ros.runtime import enable_ros
 
 # The same examples on every machine, however slow it is.
 settings.register_profile("ccr", derandomize=True, deadline=None, max_examples=25)
 settings.load_profile("ccr")
-
-DOMAINS = range(1, 101)  # the ports of higher ones reach into the ephemeral range
-
-
-def _free(domain: int) -> bool:
-    """Tell whether no participant uses the domain on this machine (DDS-RTPS 9.6.2: its port)."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        try:
-            probe.bind(("127.0.0.1", 7400 + 250 * domain + 10))
-        except OSError:
-            return False
-    return True
 
 
 def _own_domain() -> int:
@@ -32,7 +20,7 @@ def _own_domain() -> int:
     workers = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
     mine = [domain for domain in DOMAINS if domain % workers == worker % workers]
     random.shuffle(mine)
-    return next(domain for domain in mine if _free(domain))
+    return next(domain for domain in mine if is_free(domain))
 
 
 os.environ["ROS_DOMAIN_ID"] = str(_own_domain())

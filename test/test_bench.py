@@ -124,7 +124,7 @@ def test_baselines_find_the_same_pose(method, name):
         baseline = BASELINES[which](CartesianProblem(case.finger, COMPARED))
         # Before the obstacle is met, where trust-constr takes its time.
         poses.append(swept(baseline, case.pull_fraction[0] / 4, 1))
-    assert poses[0] == pytest.approx(poses[1], abs=2e-6)
+    assert poses[0] == pytest.approx(poses[1], abs=1e-5)  # trust-constr's own accuracy
 
 
 def test_literal_equation_4_is_far_off_where_relative_angles_are_not():

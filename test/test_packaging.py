@@ -139,6 +139,9 @@ def test_wheel_holds_code_data_and_scripts(wheel):
         f"{data}/ccr_ros/msg_defs/package.xml",
     ):
         assert name in names
+    for package in ("ccr_ros", "embedded_ros"):
+        for path in (ROOT / package).rglob("*.py"):
+            assert path.relative_to(ROOT).as_posix() in names
     for folder, suffix in (("config", "yaml"), ("msg_defs/msg", "msg")):
         for path in (ROOT / folder).glob(f"*.{suffix}"):
             assert f"{data}/ccr_ros/{folder}/{path.name}" in names

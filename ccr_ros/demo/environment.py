@@ -12,7 +12,8 @@ from pathlib import Path
 import ccr_ros
 
 # Higher domains' ports reach into the range that systems give to outgoing connections.
-_DOMAINS = range(1, 101)
+DOMAINS = range(1, 101)
+_PROBED = 10  # participants
 
 
 def graph_environment(environ: Mapping[str, str]) -> dict[str, str]:
@@ -33,15 +34,18 @@ def import_environment(environ: Mapping[str, str]) -> dict[str, str]:
 
 def free_domain() -> int:
     """Return a ROS domain, chosen by chance, that nobody on this machine seems to be in."""
-    domains = random.sample(_DOMAINS, len(_DOMAINS))
-    return next(filter(_is_free, domains), domains[0])
+    domains = random.sample(DOMAINS, len(DOMAINS))
+    return next(filter(is_free, domains), domains[0])
 
 
-def _is_free(domain: int) -> bool:
-    # The first participant of a domain takes this port (DDSI-RTPS 2.5, section 9.6.1).
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        try:
-            probe.bind(("", 7400 + 250 * domain + 10))
-        except OSError:
-            return False
+def is_free(domain: int) -> bool:
+    """Tell whether nobody on this machine seems to be in a ROS domain."""
+    # The participants of a domain take these ports in turn (DDSI-RTPS 2.5, section 9.6.1); the
+    # first of them may have left.
+    for participant in range(_PROBED):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            try:
+                probe.bind(("", 7400 + 250 * domain + 10 + 2 * participant))
+            except OSError:
+                return False
     return True

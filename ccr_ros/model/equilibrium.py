@@ -137,8 +137,8 @@ class EquilibriumProblem:
         # 1/2 h k (a - rest)^2 + 1/2 (h k / 3) b^2: Legendre polynomials are orthogonal.
         per_arc = np.concatenate([stiffness, stiffness / 3][: order + 1])
         rest = np.zeros((self.arcs, self.rod.size))
-        assert finger.rest_curvature is not None
-        rest[:, :3] = np.repeat(finger.rest_curvature * finger.length * h, k, axis=0)
+        turns = np.asarray(finger.rest_curvature) * finger.length * h
+        rest[:, :3] = np.repeat(turns, k, axis=0)
         self._z_rest = rest
         self.coordinate_scale = np.sqrt(h / per_arc)  # z = rest + scale * y
         self.rod_step = h

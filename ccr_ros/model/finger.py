@@ -176,7 +176,26 @@ class Finger:
             if not isinstance(obstacle, Obstacle):
                 allowed = "an obstacle (Sphere, Cylinder, Box or Plane)"
                 raise InvalidValue(f"obstacles[{i}]", obstacle, allowed)
+            self.check_clear_of_base(obstacle, f"obstacles[{i}]")
         return tuple(self.obstacles)
+
+    def check_clear_of_base(self, obstacle: Obstacle, place: str) -> None:
+        """Check that an obstacle, in the frame of the base, leaves the base disk's points free.
+
+        Raises:
+            InvalidValue: It does not; the error is located at ``place``.
+        """
+        angles = np.array([cable.angles[0] for cable in self.cables])
+        holes = self.disk_radius * np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)
+        points = np.concatenate([np.zeros((1, 3)), holes, -holes])
+        deepest = float(obstacle.signed_distance(points).min())
+        if deepest < 0:
+            raise InvalidValue(
+                place,
+                f"{type(obstacle).__name__.lower()} {obstacle.name}",
+                f"clear of the base disk of finger {self.name!r}"
+                f" (it overlaps the disk by {-deepest * 1e3:.3g} mm)",
+            )
 
     @property
     def segment_length(self) -> float:

@@ -125,9 +125,9 @@ class _Buffered:
         self.inputs = [np.zeros(function.nnz_in(i)) for i in range(function.n_in())]
         self.outputs = [np.zeros(function.nnz_out(i)) for i in range(function.n_out())]
         for i, array in enumerate(self.inputs):
-            self._buffer.set_arg(i, memoryview(array))  # type: ignore[call-arg]
+            self._buffer.set_arg(i, memoryview(array))  # type: ignore[call-arg, arg-type]
         for i, array in enumerate(self.outputs):
-            self._buffer.set_res(i, memoryview(array))  # type: ignore[call-arg]
+            self._buffer.set_res(i, memoryview(array))  # type: ignore[call-arg, arg-type]
 
     def __call__(self) -> None:
         self._call()

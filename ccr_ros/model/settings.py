@@ -27,8 +27,8 @@ class SolverSettings:
         max_iterations: Of one continuation step.
         tolerance: Largest residual force relative to the elastic one, and largest constraint
             violation relative to the finger's length.
-        time_limit: CPU time of one solve [s], so that a busy machine does not end it; one that
-            takes longer ends as not converged.
+        time_limit: CPU time of one search [s], so that a busy machine does not end it; a solve is
+            one search, or a second one from rest where obstacles have stopped the first.
     """
 
     arcs_per_segment: int = 1

@@ -46,7 +46,6 @@ class FingerSolver:
         self._obstacles_changed = False
         self._point: KktPoint
         self._pulls: np.ndarray
-        self._check_clear_of_base(finger.obstacles)
         self.reset()
 
     @property
@@ -68,7 +67,8 @@ class FingerSolver:
     @obstacles.setter
     def obstacles(self, obstacles: Sequence[Obstacle]) -> None:
         obstacles = tuple(obstacles)
-        self._check_clear_of_base(obstacles)
+        for obstacle in obstacles:
+            self.finger.check_clear_of_base(obstacle, f"obstacles.{obstacle.name}")
         # Obstacles that stay keep their contact forces as a guess.
         old = {id(o): row for o, row in zip(self.obstacles, self._point.forces, strict=True)}
         none = np.zeros(len(self.problem.points.labels))
@@ -80,11 +80,7 @@ class FingerSolver:
     def reset(self) -> None:
         """Forget the last pose: the next solve starts from the rest shape."""
         self._pulls = np.zeros(len(self.finger.cables))
-        none = np.zeros(len(self.problem.points.labels))
-        tensions = np.zeros(len(self.problem.group_cable))
-        self._point = self._derived(
-            np.zeros(self.problem.size), tensions, [none] * len(self.obstacles)
-        )
+        self._point = self._at_rest()
         self._obstacles_changed, self._solved = True, False
 
     def solve(self, pulls: Mapping[str, float] | Sequence[float] | np.ndarray) -> Solution:
@@ -107,14 +103,15 @@ class FingerSolver:
                     float(pull),
                     f"less than the cable's length inside the finger, {rest:.6g} m",
                 )
-        walk = _Walk(
-            self.problem, self._point, self._pulls, time.thread_time() + self.settings.time_limit
-        )
-        if self._obstacles_changed:
-            # Objects come and go at once, and the finger with them: that is no jump of its own.
-            walk.run(self._pulls, watched=False)
-        if walk.reached is None:
-            walk.run(target, watched=True)
+        walk = self._walk(self._point, self._pulls, target)
+        if walk.reached is not None and self.obstacles and np.any(self._point.at.y):
+            # Stuck: an obstacle that came where the finger stands, say. From rest there may be a
+            # way round it, which is a jump from where the finger was.
+            again = self._walk(self._at_rest(), np.zeros_like(target), target)
+            again.iterations += walk.iterations
+            if again.reached is None:
+                again.jumped = True
+                walk = again
         if walk.reached is None:
             self._point, self._pulls = walk.point, target
             self._obstacles_changed, self._solved = False, True
@@ -132,24 +129,28 @@ class FingerSolver:
             raise InvalidValue("sensitivity", None, "asked for after a converged solve")
         return sensitivity(self.problem, self._point)
 
+    def _walk(self, point: KktPoint, pulls: np.ndarray, target: np.ndarray) -> _Walk:
+        """Walk from a point under pulls to the target; each walk has the time limit to itself."""
+        deadline = time.thread_time() + self.settings.time_limit
+        walk = _Walk(self.problem, point, pulls, deadline)
+        if self._obstacles_changed:
+            # Objects come and go at once, and the finger with them: that is no jump of its own.
+            walk.run(pulls, watched=False)
+        if walk.reached is None:
+            walk.run(target, watched=True)
+        return walk
+
+    def _at_rest(self) -> KktPoint:
+        none = np.zeros(len(self.problem.points.labels))
+        tensions = np.zeros(len(self.problem.group_cable))
+        return self._derived(np.zeros(self.problem.size), tensions, [none] * len(self.obstacles))
+
     def _derived(
         self, y: np.ndarray, tensions: np.ndarray, forces: Sequence[np.ndarray]
     ) -> KktPoint:
         count = len(self.problem.points.labels)
         table = np.array(forces).reshape(len(forces), count)
         return derive(self.problem, self.problem.evaluate(y), tensions, table)
-
-    def _check_clear_of_base(self, obstacles: Sequence[Obstacle]) -> None:
-        base = self.problem.rest.points[self.problem.fixed] * self.finger.length
-        for obstacle in obstacles:
-            deepest = float(obstacle.signed_distance(base).min())
-            if deepest < 0:
-                raise InvalidValue(
-                    f"obstacles.{obstacle.name}",
-                    type(obstacle).__name__.lower(),
-                    f"clear of the base disk of finger {self.finger.name!r}"
-                    f" (it overlaps the disk by {-deepest * 1e3:.3g} mm)",
-                )
 
 
 class _Walk:

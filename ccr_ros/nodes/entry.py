@@ -5,19 +5,20 @@ from __future__ import annotations
 
 import sys
 
-from ccr_ros.model.errors import CcrError
-from ccr_ros.runtime import enable_ros
-
 
 def solver_node() -> int:
     """Run the solver node; arguments are in ``sys.argv``. Returns the exit code."""
-    try:
-        enable_ros()
-        from ccr_ros.nodes.solver_node import main
+    try:  # all imports in it, as a Ctrl-C may come while the libraries load
+        from ccr_ros.model.errors import CcrError
+        from ccr_ros.runtime import enable_ros
 
-        return main()
-    except KeyboardInterrupt:  # Ctrl-C while the libraries load
+        try:
+            enable_ros()
+            from ccr_ros.nodes.solver_node import main
+
+            return main()
+        except CcrError as error:
+            print(f"solver_node: error: {error}", file=sys.stderr)
+            return 1
+    except KeyboardInterrupt:
         return 0
-    except CcrError as error:
-        print(f"solver_node: error: {error}", file=sys.stderr)
-        return 1

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import time
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -23,7 +24,7 @@ from .qos import COMMAND_QUEUE, LATCHED
 
 _TIMES_KEPT = 1000  # solve times, for the percentiles
 _WARN_EVERY = 2.0  # s
-_MOST_LOOKS = 32  # turns of the executor that a backlog may delay a solve by
+_MOST_LOOKING = 0.005  # s that taking in a backlog may delay a solve by
 
 
 @dataclass(frozen=True)
@@ -83,7 +84,8 @@ class FingerChannel:
         self._unsolved = True  # whether there is something to solve
         self._new_scene = True  # whether the obstacles are newer than the pose
         self._waiting = False  # whether _wanted came as a message and is not solved yet
-        self._looks = self._seen = self._dropped_told = 0
+        self._seen = self._dropped_told = 0
+        self._looking_since: float | None = None  # when the backlog was first seen
         self._backlog = False  # whether the last look found newer pulls
 
         name = self.finger.name
@@ -129,8 +131,12 @@ class FingerChannel:
         quiet = self._seen == self.received
         self._backlog = not quiet
         self._seen = self.received
-        self._looks = 0 if quiet or self._looks >= _MOST_LOOKS else self._looks + 1
-        return self._looks == 0
+        now = time.monotonic()
+        if self._looking_since is None:
+            self._looking_since = now
+        if quiet or now - self._looking_since > _MOST_LOOKING:
+            self._looking_since = None
+        return self._looking_since is None
 
     def solve(self) -> None:
         """Solve the wanted pulls and publish: the new pose, or the last good one as stale."""

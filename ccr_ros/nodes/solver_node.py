@@ -215,7 +215,10 @@ class SolverNode(Node):
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node until it is interrupted; return the exit code."""
     try:
-        rclpy.init(args=args)
+        try:
+            rclpy.init(args=args)
+        except Exception as error:  # bad --ros-args: rclpy has many kinds of error for them
+            return _cannot_start(error)
         return _run()
     except KeyboardInterrupt:
         return 0
@@ -229,10 +232,14 @@ def _run() -> int:
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     except (CcrError, ParameterException) as error:
-        print(f"solver_node: error: {' '.join(str(error).split())}", file=sys.stderr)
-        return 1
+        return _cannot_start(error)
     except Exception:
         # A signal takes the context down at once, and what is publishing just then fails.
         if rclpy.ok():
             raise
     return 0
+
+
+def _cannot_start(error: Exception) -> int:
+    print(f"solver_node: error: {' '.join(str(error).split())}", file=sys.stderr)
+    return 1

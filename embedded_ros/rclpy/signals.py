@@ -10,8 +10,11 @@ from __future__ import annotations
 import signal
 import threading
 from enum import IntFlag
+from functools import partial
 from types import FrameType
 from typing import Any
+
+from embedded_ros.interrupts import deliver
 
 from .context import live_contexts
 from .guard_condition import GuardCondition
@@ -34,7 +37,7 @@ def _handle(number: int, frame: FrameType | None) -> None:
         context._invalidate()
     previous = _previous.get(number)
     if callable(previous):
-        previous(number, frame)
+        deliver(partial(previous, number, frame))
 
 
 def install_signal_handlers(options: SignalHandlerOptions = SignalHandlerOptions.ALL) -> None:

@@ -37,6 +37,8 @@ from cyclonedds.qos import Qos as CycloneQos
 from cyclonedds.sub import DataReader, Subscriber
 from cyclonedds.topic import Topic
 
+from embedded_ros.interrupts import uninterrupted
+
 from .base import Endpoint, Participant, Qos, Reader, Sample, StatusChange, Waiter, Writer
 from .cyclone_config import domain_xml
 from .cyclone_types import carrier, from_cyclone, to_cyclone
@@ -147,10 +149,12 @@ class CycloneReader(Reader):
         reader = self._reader
         if reader is None:
             return []
+        with uninterrupted():
+            taken = reader.take(limit)
         now = time.time_ns()
         return [
             Sample(s.payload, s.sample_info.source_timestamp, now, s.sample_info.publication_handle)
-            for s in reader.take(limit)
+            for s in taken
             if not isinstance(s, InvalidSample)
         ]
 
@@ -286,7 +290,7 @@ class CycloneParticipant(Participant):
             return CycloneWaiter(self)
 
     def endpoints(self) -> list[Endpoint]:
-        with _lock:
+        with uninterrupted(), _lock:
             if self.participant is None:
                 return []
             if self._builtin is None:

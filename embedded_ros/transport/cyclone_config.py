@@ -22,6 +22,11 @@ RANGES = ("OFF", "LOCALHOST", "SUBNET", "SYSTEM_DEFAULT")
 MAX_PARTICIPANTS = 99
 
 
+# A closing writer waits this long for readers that do not acknowledge, as those of a killed process
+# do not; the default of a second would add up over a node's writers.
+_INTERNAL = "<Internal><WriterLingerDuration>30ms</WriterLingerDuration></Internal>"
+
+
 class DiscoveryError(RuntimeError):
     """A discovery setting has a value that ROS does not know."""
 
@@ -109,5 +114,5 @@ def _fragment(general: str, discovery: str) -> str:
     general = f"<General>{general}</General>" if general else ""
     return (
         '<CycloneDDS><Domain Id="any">'
-        f"{general}<Discovery>{discovery}</Discovery></Domain></CycloneDDS>"
+        f"{general}<Discovery>{discovery}</Discovery>{_INTERNAL}</Domain></CycloneDDS>"
     )

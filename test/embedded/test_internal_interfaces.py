@@ -164,6 +164,8 @@ def test_domain_configuration():
     local = domain_xml({"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"})
     assert 'address="127.0.0.1"' in local
     assert "<AllowMulticast>false</AllowMulticast>" in local
+    # A node with twenty writers must not wait a second for each when a reader was killed.
+    assert "<WriterLingerDuration>30ms</WriterLingerDuration>" in local
     users = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "CYCLONEDDS_URI": "file:///mine.xml"}
     assert domain_xml(users).endswith(",file:///mine.xml")
     peers = domain_xml({"ROS_STATIC_PEERS": "10.0.0.1;robot.local"})

@@ -46,6 +46,12 @@ def test_filters():
     assert again == [True, True, True]
 
 
+def test_a_filtered_message_bears_its_loggers_name(capfd):
+    get_logger("a_test.named").warning("mind the gap", throttle_duration_sec=60.0)
+    captured = capfd.readouterr()
+    assert "] [a_test.named]: mind the gap" in (captured.err or captured.out)
+
+
 def test_bad_arguments():
     logger = get_logger("a_test.bad")
     with pytest.raises(TypeError):

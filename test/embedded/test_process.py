@@ -11,8 +11,8 @@ from std_msgs.msg import String
     ("number", "mode", "endings"),
     [
         (signal.SIGINT, "single", ("KeyboardInterrupt", "ExternalShutdownException")),
-        (signal.SIGTERM, "single", ("ExternalShutdownException",)),
-        (signal.SIGTERM, "multi", ("returned",)),
+        (signal.SIGTERM, "single", ("ExternalShutdownException", "returned", "cut short")),
+        (signal.SIGTERM, "multi", ("returned", "cut short")),
     ],
 )
 def test_signals_end_a_spinning_process_cleanly(program, number, mode, endings):

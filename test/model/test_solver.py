@@ -205,6 +205,21 @@ def test_object_appears_and_goes() -> None:
     assert back.backbone == pytest.approx(free.backbone, abs=1e-9)
 
 
+def test_object_put_through_a_finger_does_not_jam_it() -> None:
+    """Where the way out of an object is barred, the finger takes the one from rest, and says so."""
+    finger = load_finger(find_config("contact_cylinder"))
+    solver = FingerSolver(replace(finger, obstacles=()))
+    pull = 0.03 * solver.rest_lengths
+    solver.solve(pull)
+    solver.obstacles = finger.obstacles  # beyond the rod by now
+    solution = solver.solve(pull)
+    assert solution.certificate.converged and solution.certificate.branch_jump
+    assert solution.energy == pytest.approx(solve(finger, pull).energy, rel=1e-8)
+    back = solver.solve([0.0])
+    assert back.certificate.converged and not back.certificate.branch_jump
+    assert back.backbone == pytest.approx(solver.rest.backbone, abs=1e-9)
+
+
 def test_obstacle_moved_bit_by_bit_is_one_put_there() -> None:
     finger = load_finger(find_config("helical"))
     solver, box = FingerSolver(finger), np.array([0.03, 0.03, 0.03])

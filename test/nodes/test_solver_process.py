@@ -99,16 +99,19 @@ sys.exit(solver_node())
 
 
 @pytest.mark.parametrize(
-    ("parameter", "text"),
+    ("arguments", "text"),
     [
-        ("gripper_file:=no_such_gripper", "gripper_sphere"),
-        ("gripper_file:=straight", "straight.yaml"),
-        ("arcs_per_segment:=0", "arcs_per_segment"),
+        (("-p", "gripper_file:=no_such_gripper"), "gripper_sphere"),
+        (("-p", "gripper_file:=straight"), "straight.yaml"),
+        (("-p", "arcs_per_segment:=0"), "arcs_per_segment"),
+        (("--params-file", "no_such_file.yaml"), "no_such_file.yaml"),
+        (("-r", "__ns:=/1bad"), "1bad"),
+        (("--bogus",), "--bogus"),
     ],
 )
-def test_what_cannot_start_says_why_in_one_line(parameter, text):
+def test_what_cannot_start_says_why_in_one_line(arguments, text):
     done = subprocess.run(
-        command("-p", parameter),
+        command(*arguments),
         env=environment(),
         capture_output=True,
         text=True,

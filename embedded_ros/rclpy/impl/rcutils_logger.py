@@ -159,8 +159,8 @@ class RcutilsLogger:
         if context is None:
             wanted = filters_from_kwargs(kwargs)
             context = {"severity": severity, "name": name, "filters": wanted, "kwargs": kwargs}
-            for name in wanted:
-                FILTERS[name].initialize_context(context, **kwargs)
+            for wanted_filter in wanted:
+                FILTERS[wanted_filter].initialize_context(context, **kwargs)
             self._contexts[caller] = context
         else:
             if context["severity"] != severity:

@@ -43,6 +43,10 @@ def main():
         rclpy.spin(node, executor)
     except (KeyboardInterrupt, ExternalShutdownException) as end:
         how = type(end).__name__
+    except Exception:
+        if rclpy.ok():
+            raise
+        how = "cut short"  # as real rclpy may be, when the signal comes between two turns
     finally:
         node.destroy_node()
         rclpy.try_shutdown()
