@@ -47,7 +47,8 @@ def _smallest_eigenvalue(point: KktPoint) -> float:
     """
     rows, hessian = point.rows[point.active], point.hessian
     if len(rows):
-        q = np.linalg.qr(rows.T)[0]
+        one = len(rows) == 1  # as mostly; a QR decomposition costs more than all the rest
+        q = rows.T / np.linalg.norm(rows) if one else np.linalg.qr(rows.T)[0]
         half = hessian @ q
         raised = q.T @ half + np.eye(q.shape[1]) * (1.0 + float(np.abs(hessian).sum(axis=1).max()))
         hessian = hessian - half @ q.T - q @ half.T + q @ raised @ q.T
