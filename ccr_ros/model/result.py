@@ -47,19 +47,27 @@ def _smallest_eigenvalue(point: KktPoint) -> float:
     """
     rows, hessian = point.rows[point.active], point.hessian
     if len(rows):
-        one = len(rows) == 1  # as mostly; a QR decomposition costs more than all the rest
-        q = rows.T / np.linalg.norm(rows) if one else np.linalg.qr(rows.T)[0]
+        q = _row_space(rows)
         half = hessian @ q
         raised = q.T @ half + np.eye(q.shape[1]) * (1.0 + float(np.abs(hessian).sum(axis=1).max()))
         hessian = hessian - half @ q.T - q @ half.T + q @ raised @ q.T
     return float(np.linalg.eigvalsh(hessian)[0])
 
 
+def _row_space(rows: np.ndarray) -> np.ndarray:
+    """Orthonormal basis (N, rank) of the span of rows; twin constraints are not counted twice."""
+    if len(rows) == 1:  # as mostly; a decomposition costs more than all the rest
+        return rows.T / np.linalg.norm(rows)
+    _, size, basis = np.linalg.svd(rows, full_matrices=False)
+    return basis[size > 1e-9 * size[0]].T
+
+
 def _null_space(point: KktPoint) -> np.ndarray:
     rows = point.rows[point.active]
     if not len(rows):
         return np.eye(len(point.hessian))
-    return np.linalg.qr(rows.T, mode="complete")[0][:, len(rows) :]
+    basis = _row_space(rows)
+    return np.linalg.qr(basis, mode="complete")[0][:, basis.shape[1] :]
 
 
 def make_solution(

@@ -240,6 +240,22 @@ def test_obstacle_over_the_base_is_refused_and_the_old_ones_stay() -> None:
     assert solver.obstacles == (ball,)
 
 
+def test_smallest_eigenvalue_is_that_of_the_reduced_hessian() -> None:
+    """Against the null space's basis written out: stable, and at a saddle with contact."""
+    ball = Sphere(np.array([0, 0.09, 0.13]), 0.03)
+    finger = make_finger(straight_cable(), straight_cable(1, name="side"), obstacles=(ball,))
+    solver = FingerSolver(finger)
+    for pulls in ([0.004, -0.01], [0.004, 0.002], [0.0085, -0.01]):
+        solution = solver.solve(pulls)
+        point = solver._point
+        rows = point.rows[point.active]
+        _, _, basis = np.linalg.svd(rows)
+        null = basis[len(rows) :].T
+        wanted = np.linalg.eigvalsh(null.T @ point.hessian @ null)[0]
+        assert solution.certificate.smallest_eigenvalue == pytest.approx(wanted, abs=1e-9)
+    assert solution.contacts and wanted < 0
+
+
 def test_reset_starts_from_rest() -> None:
     solver = FingerSolver(make_finger())
     a = solver.solve([0.006])
@@ -343,6 +359,8 @@ def test_two_cables_in_one_hole_share_the_load() -> None:
     alone = solve(make_finger(straight_cable(4)), [0.005])
     assert solution.certificate.converged
     assert solution.tensions.sum() == pytest.approx(alone.tensions[0], rel=1e-6)
+    eigenvalue = alone.certificate.smallest_eigenvalue
+    assert solution.certificate.smallest_eigenvalue == pytest.approx(eigenvalue, rel=1e-6)
 
 
 def test_solution_as_json() -> None:
