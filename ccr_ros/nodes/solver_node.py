@@ -223,7 +223,7 @@ def main(args: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         return 0
     finally:
-        rclpy.try_shutdown()
+        _shut_down()
 
 
 def _run() -> int:
@@ -238,6 +238,15 @@ def _run() -> int:
         if rclpy.ok():
             raise
     return 0
+
+
+def _shut_down() -> None:
+    try:
+        rclpy.try_shutdown()
+    except Exception:
+        # rclpy answers signals in a thread of its own, which may have come first by a hair.
+        if rclpy.ok():
+            raise
 
 
 def _cannot_start(error: Exception) -> int:

@@ -72,7 +72,7 @@ def test_every_key_arrives(write):
         "obstacles:\n"
         "  - {type: sphere, name: ball, center: [0, 0, 1], radius: 0.1}\n"
         "  - {type: cylinder, point: [0.1, 0, 0], axis: [0, 0, 2], radius: 0.02}\n"
-        "  - {type: box, center: [0, 1, 0], orientation: [0, 0, 0, 1], size: [1, 2, 3]}\n"
+        "  - {type: box, center: [0, 3, 0], orientation: [0, 0, 0, 1], size: [1, 2, 3]}\n"
         "  - {type: plane, point: [0, 0, -1], normal: [0, 0, 3]}\n"
     )
     text = text.replace("12]}\n", "12]}\n  - {name: short, angles: [0.5, -0.25], last_disk: 1}\n")
