@@ -72,7 +72,8 @@ def declare(node: Node) -> SolverParameters:
     time_limit = fixed(
         "time_limit",
         1.0,
-        "Longest time of one solve [s]; one that takes longer ends without a new pose.",
+        "Longest CPU time of one search [s]; a solve is one, or two where obstacles bar the way; "
+        "one that takes longer ends without a new pose.",
         floating_point_range=[FloatingPointRange(from_value=0.001, to_value=60.0, step=0.0)],
     )
     prefix = fixed(
