@@ -39,7 +39,10 @@ def _stumpff(t: ca.SX, first: int) -> ca.SX:
 
 
 def _arms() -> np.ndarray:
-    """The linear map (12, 18) of (F, M) to the (6, 3) matrix of (w, v) -> M w - tr M w + v x F."""
+    """The linear map (12, 18) from F and M to the matrix (6, 3) that twists are multiplied by.
+
+    A row (w, v) times it is M' w - tr(M) w + v x F; see `Rod.curvature_hessian`.
+    """
     columns = []
     for unit in np.eye(12):
         force, moment = unit[:3], unit[3:].reshape(3, 3)

@@ -33,9 +33,6 @@ class FingerSolver:
     Args:
         finger: The finger; its ``obstacles`` are the first ones.
         settings: Discretisation and tolerances.
-
-    Raises:
-        InvalidValue: An obstacle contains the finger's base disk.
     """
 
     def __init__(self, finger: Finger, settings: SolverSettings | None = None) -> None:
@@ -61,7 +58,11 @@ class FingerSolver:
 
     @property
     def obstacles(self) -> tuple[Obstacle, ...]:
-        """What the finger may touch, in its base frame; assign to replace."""
+        """What the finger may touch, in its base frame; assign to replace.
+
+        Raises:
+            InvalidValue: On assigning one that overlaps the base disk; the old ones stay.
+        """
         return self.problem.obstacles
 
     @obstacles.setter

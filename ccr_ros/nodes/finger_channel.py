@@ -48,9 +48,6 @@ class FingerChannel:
         settings: Of the solver.
         broadcaster: For the tip's transform.
         wake: Called when there is something to solve.
-
-    Raises:
-        InvalidValue: An obstacle in the finger's file overlaps its base disk.
     """
 
     def __init__(

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import array
 import struct
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Any
 
@@ -65,7 +66,7 @@ def uniform_format(leaves: list[tuple[str, str]]) -> tuple[str, int, int] | None
     return (text, position, first) if position % first == 0 else None
 
 
-class Generator:
+class Generator(ABC):
     """State shared by both directions: lines, names, the open struct group, what is known of the
     position.
     """
@@ -151,20 +152,20 @@ class Generator:
 
     empty = ""
 
-    def flush(self) -> None:
-        raise NotImplementedError
+    @abstractmethod
+    def flush(self) -> None: ...
 
-    def emit_skip(self, size: int) -> None:
-        raise NotImplementedError
+    @abstractmethod
+    def emit_skip(self, size: int) -> None: ...
 
-    def emit_align(self, size: int) -> None:
-        raise NotImplementedError
+    @abstractmethod
+    def emit_align(self, size: int) -> None: ...
 
-    def element(self, ftype: FieldType, target: str) -> None:
-        raise NotImplementedError
+    @abstractmethod
+    def element(self, ftype: FieldType, target: str) -> None: ...
 
-    def collection(self, ftype: FieldType, target: str) -> None:
-        raise NotImplementedError
+    @abstractmethod
+    def collection(self, ftype: FieldType, target: str) -> None: ...
 
     def compile(self, head: str, tail: str) -> Callable[..., Any]:
         self.flush()
