@@ -68,6 +68,7 @@ class Recorder(Node):
         self._start: float | None = None  # of the pulls, steady clock [s]
         # By finger and stamp: the messages of one pose that have arrived, by topic.
         self._partial: dict[str, dict[int, dict[str, Any]]] = {n: {} for n in lengths}
+        self._posed: set[str] = set()  # fingers of which a whole pose has arrived
 
         for mounted in gripper.fingers:
             name = mounted.finger.name
@@ -161,6 +162,7 @@ class Recorder(Node):
     def _add(
         self, finger: str, state: FingerState, backbone: PoseArray, parts: Mapping[str, PoseArray]
     ) -> None:
+        self._posed.add(finger)
         self._builder.add(
             finger,
             pulls=state.pulls,
@@ -199,7 +201,8 @@ class Recorder(Node):
         self.measurements.markers += 1
 
     def _sample(self) -> None:
-        if self._start is not None and self.complete:
+        # A state is heard before the rest of its pose: a frame waits for all of every finger.
+        if self._start is not None and len(self._posed) == len(self._bases):
             self._builder.sample(self._now())
 
 
