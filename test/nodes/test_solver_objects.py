@@ -67,7 +67,7 @@ def test_object_appears_and_goes(gripping):
 
     def drawn(arrays):
         parts = ("finger_1/contacts", "finger_1/forces", "objects")
-        return all(shown(arrays[-1], part) for part in parts)
+        return bool(arrays) and all(shown(arrays[-1], part) for part in parts)
 
     probe.until(lambda: drawn(probe.markers()), "contact, force and object in the markers")
     contacts = {(m.ns, m.id) for m in shown(probe.markers()[-1], "finger_1/contacts")}
