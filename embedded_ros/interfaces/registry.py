@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from rosbags.interfaces import Nodetype
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.typesys import Stores, get_typestore
 
 from . import standard
 from .cdr import make_deserializer, make_serializer
@@ -22,6 +22,9 @@ from .derived import Group, derive_action, derive_service, make_group_class
 from .spec import Constant, DefinitionError, Field, FieldType, MessageSpec, parse_message
 
 KINDS = ("msg", "srv", "action")
+
+#: rosidl's stand-in for the members of an empty message
+EMPTY_MEMBER = "structure_needs_at_least_one_member"
 
 
 def package_name(folder: Path) -> str:
@@ -122,7 +125,7 @@ class Registry:
         members = tuple(
             Field(member, _store_type(desc), defaults.get(member))
             for member, desc in fields
-            if member != "structure_needs_at_least_one_member"
+            if member != EMPTY_MEMBER
         )
         values = tuple(
             Constant(constant, base, bytes([value]) if base == "byte" else value)
@@ -175,14 +178,9 @@ class Registry:
         for member in spec.fields:
             if member.type.is_message:
                 self._register(member.type.base)
-        if name in self._texts:
-            # rosbags accepts no text without members; rosidl hashes an empty message as one dummy
-            # member.
-            text = (
-                self._texts[name][0] if spec.fields else "uint8 structure_needs_at_least_one_member"
-            )
-            if name not in self._store.fielddefs:
-                self._store.register(get_types_from_msg(text, name))
+        if name not in self._store.fielddefs:
+            members = spec.fields or (Field(EMPTY_MEMBER, FieldType("uint8")),)
+            self._store.fielddefs[name] = ([], [(m.name, _to_store(m.type)) for m in members])
         # In .msg files char is an alias of uint8; rosbags hashes it as IDL's char.
         constants, fields = self._store.fielddefs[name]
         self._store.fielddefs[name] = (constants, [(n, _char_to_uint8(desc)) for n, desc in fields])
@@ -206,6 +204,16 @@ def _store_type(desc: Any) -> FieldType:
     inner = _store_type(value[0])
     sort = "array" if kind == Nodetype.ARRAY else "sequence"
     return FieldType(inner.base, sort, value[1], inner.string_bound)
+
+
+def _to_store(ftype: FieldType) -> Any:
+    """The reverse of :func:`_store_type`."""
+    desc: Any = (Nodetype.NAME, ftype.base)
+    if not ftype.is_message:
+        desc = (Nodetype.BASE, (ftype.base, ftype.string_bound))
+    if ftype.kind == "scalar":
+        return desc
+    return (Nodetype.ARRAY if ftype.kind == "array" else Nodetype.SEQUENCE, (desc, ftype.size))
 
 
 def _char_to_uint8(desc: Any) -> Any:

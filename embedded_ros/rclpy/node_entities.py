@@ -4,12 +4,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from embedded_ros.interfaces.registry import registry
 from embedded_ros.transport.graph import NodeEntry, dds_type_name
 
 from .callback_groups import CallbackGroup, MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
+from .client import Client
 from .clock import Clock, ROSClock
 from .constants import S_TO_NS
 from .event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
@@ -17,13 +18,15 @@ from .guard_condition import GuardCondition
 from .impl.queued import QueuedEntity
 from .impl.rcutils_logger import RcutilsLogger
 from .publisher import Publisher
-from .qos import QoSProfile
+from .qos import QoSProfile, qos_profile_services_default
+from .service import Service
 from .subscription import Subscription
 from .timer import Rate, Timer
-from .type_support import check_is_valid_msg_type
+from .type_support import check_is_valid_msg_type, check_is_valid_srv_type
 
 if TYPE_CHECKING:
     from .context import Context
+    from .node import Node
 
 
 class EntityHolder:
@@ -37,8 +40,8 @@ class EntityHolder:
     def __init__(self) -> None:
         self._publishers: list[Publisher] = []
         self._subscriptions: list[Subscription] = []
-        self._clients: list[Any] = []
-        self._services: list[Any] = []
+        self._clients: list[Client] = []
+        self._services: list[Service] = []
         self._timers: list[Timer] = []
         self._guards: list[GuardCondition] = []
         self._waitables: list[Any] = []
@@ -62,12 +65,12 @@ class EntityHolder:
         yield from self._subscriptions
 
     @property
-    def clients(self) -> Iterator[Any]:
+    def clients(self) -> Iterator[Client]:
         """The service clients created here."""
         yield from self._clients
 
     @property
-    def services(self) -> Iterator[Any]:
+    def services(self) -> Iterator[Service]:
         """The services created here."""
         yield from self._services
 
@@ -202,6 +205,50 @@ class EntityHolder:
         endpoints = self._context.graph.endpoints()
         return [e.qos for e in endpoints if e.topic == dds_topic and e.is_reader == readers]
 
+    def create_client(
+        self,
+        srv_type: Any,
+        srv_name: str,
+        *,
+        qos_profile: QoSProfile = qos_profile_services_default,
+        callback_group: CallbackGroup | None = None,
+    ) -> Client:
+        """Make a service client.
+
+        :raises NoTypeSupportImportedException: ``srv_type`` is no service class.
+        :raises InvalidServiceNameException: the service name is invalid.
+        """
+        check_is_valid_srv_type(srv_type)
+        group = callback_group or self._default_callback_group
+        client = Client(cast("Node", self), srv_type, srv_name, qos_profile, group)
+        return self._keep(client, self._clients)
+
+    def create_service(
+        self,
+        srv_type: Any,
+        srv_name: str,
+        callback: Callable[[Any, Any], Any],
+        *,
+        qos_profile: QoSProfile = qos_profile_services_default,
+        callback_group: CallbackGroup | None = None,
+    ) -> Service:
+        """Make a service server; the callback takes request and response and returns the response.
+
+        :raises NoTypeSupportImportedException: ``srv_type`` is no service class.
+        :raises InvalidServiceNameException: the service name is invalid.
+        """
+        check_is_valid_srv_type(srv_type)
+        group = callback_group or self._default_callback_group
+        service = Service(cast("Node", self), srv_type, srv_name, callback, group, qos_profile)
+        return self._keep(service, self._services)
+
+    def _keep(self, entity: Any, known: list[Any]) -> Any:
+        """Have the executor serve a new entity."""
+        entity.callback_group.add_entity(entity)
+        known.append(entity)
+        self._wake_executor()
+        return entity
+
     def create_timer(
         self,
         timer_period_sec: float,
@@ -221,10 +268,7 @@ class EntityHolder:
             autostart=autostart,
         )
         timer._wake = self._wake_executor
-        group.add_entity(timer)
-        self._timers.append(timer)
-        self._wake_executor()
-        return timer
+        return self._keep(timer, self._timers)
 
     def create_guard_condition(
         self, callback: Callable[..., Any], callback_group: CallbackGroup | None = None
@@ -233,10 +277,7 @@ class EntityHolder:
         group = callback_group or self._default_callback_group
         guard = GuardCondition(callback, group, context=self._context)
         guard._wake = self._wake_executor
-        group.add_entity(guard)
-        self._guards.append(guard)
-        self._wake_executor()
-        return guard
+        return self._keep(guard, self._guards)
 
     def create_rate(self, frequency: float, clock: Clock | None = None) -> Rate:
         """Make a rate in Hz.
@@ -289,6 +330,14 @@ class EntityHolder:
         self._wake_executor()
         return True
 
+    def destroy_client(self, client: Client) -> bool:
+        """Destroy a service client; False when it is not of this node."""
+        return self._destroy(client, self._clients)
+
+    def destroy_service(self, service: Service) -> bool:
+        """Destroy a service server; False when it is not of this node."""
+        return self._destroy(service, self._services)
+
     def destroy_timer(self, timer: Timer) -> bool:
         """Destroy a timer; False when it is not of this node."""
         return self._destroy(timer, self._timers)
@@ -305,8 +354,16 @@ class EntityHolder:
     def _destroy_entities(self) -> None:
         """Destroy everything that was made here."""
         made: tuple[list[Any], ...]
-        made = (self._publishers, self._subscriptions, self._timers, self._guards)
-        for entity in [entity for known in made for entity in known]:
+        made = (
+            self._clients,
+            self._services,
+            self._publishers,
+            self._subscriptions,
+            self._timers,
+            self._guards,
+        )
+        everything: list[Any] = [entity for known in made for entity in known]
+        for entity in everything:
             entity.destroy()
         for known in (*made, self._waitables):
             known.clear()

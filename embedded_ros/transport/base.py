@@ -65,6 +65,8 @@ class Writer(ABC):
     """Sends payloads on one topic."""
 
     guid: bytes
+    #: names this writer in :attr:`Sample.writer` and among the peers of readers of this process
+    handle: int
 
     @abstractmethod
     def write(self, payload: bytes) -> None:
@@ -73,6 +75,10 @@ class Writer(ABC):
     @abstractmethod
     def matched(self) -> int:
         """Number of readers that this writer sends to."""
+
+    @abstractmethod
+    def peers(self) -> dict[int, bytes]:
+        """The readers that this writer sends to, by handle, with the user data they announce."""
 
     @abstractmethod
     def wait_for_acked(self, timeout: int) -> bool:
@@ -105,6 +111,12 @@ class Reader(ABC):
     @abstractmethod
     def matched(self) -> int:
         """Number of writers that this reader hears."""
+
+    @abstractmethod
+    def peers(self) -> dict[int, bytes]:
+        """The writers that this reader hears, by handle (as in :attr:`Sample.writer`), with the
+        user data they announce.
+        """
 
     @abstractmethod
     def status(self, kind: str) -> StatusChange:

@@ -44,6 +44,8 @@ from .cyclone_config import domain_xml
 from .cyclone_types import carrier, from_cyclone, to_cyclone
 
 SLICE = 100_000_000
+#: the binding gives the same handle as a signed number here and as an unsigned one there
+_UNSIGNED = 2**64 - 1
 _ANY = SampleState.Any | ViewState.Any | InstanceState.Any
 
 _lock = threading.RLock()
@@ -72,6 +74,24 @@ def _enter_domain(domain_id: int) -> None:
     _participants[domain_id] = _participants.get(domain_id, 0) + 1
 
 
+class _Peers:
+    """User data of matched endpoints, read once each: reading it back is slow in the binding."""
+
+    def __init__(self, handles: Any, data: Any) -> None:
+        self._handles = handles
+        self._data = data
+        self._known: dict[int, bytes] = {}
+
+    def read(self) -> dict[int, bytes]:
+        handles = {handle & _UNSIGNED: handle for handle in self._handles()}
+        for key in handles.keys() - self._known.keys():
+            if (peer := self._data(handles[key])) is not None:
+                self._known[key] = from_cyclone(peer.qos)[1]
+        for key in self._known.keys() - handles.keys():
+            del self._known[key]
+        return dict(self._known)
+
+
 class CycloneWriter(Writer):
     """A data writer. Statuses are read on demand."""
 
@@ -81,7 +101,10 @@ class CycloneWriter(Writer):
         self._type = topic.data_type
         self._writer: Any = DataWriter(owner.publisher, topic, qos=qos)
         self.guid = self._writer.guid.bytes
-        self.handle = self._writer.get_instance_handle()
+        self.handle = self._writer.get_instance_handle() & _UNSIGNED
+        self._peers: Any = _Peers(
+            self._writer.get_matched_subscriptions, self._writer.get_matched_subscription_data
+        )
 
     def write(self, payload: bytes) -> None:
         self._writer.write(self._type(payload))
@@ -89,6 +112,10 @@ class CycloneWriter(Writer):
     def matched(self) -> int:
         with _lock:
             return len(self._writer.get_matched_subscriptions()) if self._writer else 0
+
+    def peers(self) -> dict[int, bytes]:
+        with uninterrupted(), _lock:
+            return self._peers.read() if self._writer else {}
 
     def wait_for_acked(self, timeout: int) -> bool:
         until = time.monotonic_ns() + timeout
@@ -132,6 +159,7 @@ class CycloneWriter(Writer):
     def close(self) -> None:
         with _lock:
             self._writer = None
+            self._peers = None
 
 
 class CycloneReader(Reader):
@@ -143,6 +171,9 @@ class CycloneReader(Reader):
         self._reader: Any = DataReader(owner.subscriber, topic, qos=qos)
         self.guid = self._reader.guid.bytes
         self.condition: Any = ReadCondition(self._reader, _ANY)
+        self._peers: Any = _Peers(
+            self._reader.get_matched_publications, self._reader.get_matched_publication_data
+        )
         self._waiters: set[CycloneWaiter] = set()
 
     def take(self, limit: int) -> list[Sample]:
@@ -153,14 +184,18 @@ class CycloneReader(Reader):
             taken = reader.take(limit)
         now = time.time_ns()
         return [
-            Sample(s.payload, s.sample_info.source_timestamp, now, s.sample_info.publication_handle)
+            Sample(s.payload, i.source_timestamp, now, i.publication_handle & _UNSIGNED)
             for s in taken
-            if not isinstance(s, InvalidSample)
+            if not isinstance(s, InvalidSample) and (i := s.sample_info)
         ]
 
     def matched(self) -> int:
         with _lock:
             return len(self._reader.get_matched_publications()) if self._reader else 0
+
+    def peers(self) -> dict[int, bytes]:
+        with uninterrupted(), _lock:
+            return self._peers.read() if self._reader else {}
 
     def status(self, kind: str) -> StatusChange:
         if self._reader is None:
@@ -189,6 +224,7 @@ class CycloneReader(Reader):
                 waiter.detach(self)
             self.condition = None
             self._reader = None
+            self._peers = None
 
 
 class CycloneWaiter(Waiter):
