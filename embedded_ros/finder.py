@@ -70,7 +70,7 @@ class _InterfaceLoader(Loader):
         def get(name: str) -> Any:
             if name.startswith(short + "_"):
                 try:
-                    return registry.message_class(f"{package}/{kind}/{name}")
+                    return registry.interface_class(f"{package}/{kind}/{name}")
                 except KeyError:
                     pass
             raise AttributeError(f"module '{module.__name__}' has no attribute '{name}'")

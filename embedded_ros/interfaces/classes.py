@@ -26,6 +26,7 @@ def snake_case(name: str) -> str:
 class MessageMeta(type):
     """Keeps constants and defaults readable on the class, and read-only."""
 
+    _TYPE_SUPPORT = "embedded_ros"
     _constants_: frozenset[str]
 
     def __setattr__(cls, name: str, value: Any) -> None:

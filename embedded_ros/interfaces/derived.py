@@ -66,24 +66,40 @@ class Group(type):
     instances.
     """
 
+    _TYPE_SUPPORT = "embedded_ros"
+
     def __call__(cls, *args: Any, **kwargs: Any) -> Any:
-        raise NotImplementedError(f"{cls.__name__} cannot be instantiated; use its parts")
+        kind = "Action" if hasattr(cls, "Goal") else "Service"
+        raise NotImplementedError(f"{kind} classes can not be instantiated")
 
 
-def make_group_class(name: str, classes: Callable[[str], type]) -> Any:
-    """The class of a service (``Request``, ``Response``, ``Event``) or action (``Goal``,
-    ``Result``, ...).
-    """
+def _group(name: str, members: dict[str, Any], file_stem: str) -> Any:
+    """A class of the interface `name` in the module of the file that defines it."""
     package, kind, short = name.split("/")
-    parts: dict[str, Any] = {"_name": name}
-    if kind == "srv":
-        parts.update({part: classes(f"{name}_{part}") for part in SERVICE_PARTS})
-    else:
-        parts.update({part: classes(f"{name}_{part}") for part in ACTION_PARTS})
-        impl = {"FeedbackMessage": classes(f"{name}_FeedbackMessage")}
-        for service in ("SendGoal", "GetResult"):
-            members = {part: classes(f"{name}_{service}_{part}") for part in SERVICE_PARTS}
-            impl[service + "Service"] = Group(service, (), members)
-        parts["Impl"] = Group("Impl", (), impl)
-    parts["__module__"] = f"{package}.{kind}._{snake_case(short)}"
-    return Group(short, (), parts)
+    module = f"{package}.{kind}._{snake_case(file_stem)}"
+    return Group(short, (), {"_name": name, "__module__": module, **members})
+
+
+def make_group_class(name: str, classes: Callable[[str], Any]) -> Any:
+    """The class of a service (``Request``, ``Response``, ``Event``), of an action (``Goal``,
+    ``Result``, ...) or of one of an action's own services (``Name_SendGoal``, ``Name_GetResult``).
+
+    :param classes: gives the class of any other interface.
+    """
+    _, kind, short = name.split("/")
+    if kind == "srv" or "_" in short:
+        members = {part: classes(f"{name}_{part}") for part in SERVICE_PARTS}
+        return _group(name, members, short.split("_")[0])
+    members = {part: classes(f"{name}_{part}") for part in ACTION_PARTS}
+    members["Impl"] = type(
+        "Impl",
+        (),
+        {
+            "SendGoalService": classes(f"{name}_SendGoal"),
+            "GetResultService": classes(f"{name}_GetResult"),
+            "FeedbackMessage": classes(f"{name}_FeedbackMessage"),
+            "CancelGoalService": classes("action_msgs/srv/CancelGoal"),
+            "GoalStatusMessage": classes("action_msgs/msg/GoalStatusArray"),
+        },
+    )
+    return _group(name, members, short)

@@ -141,17 +141,19 @@ class Registry:
             return self._classes[name]
 
     def interface_class(self, name: str) -> Any:
-        """What ``from package.kind import Name`` gives: a message class or a service or action
-        group.
+        """The class of any interface: a message, a service, an action, or a part of one.
+
+        :raises KeyError: nothing of that name is known.
         """
-        _, kind, short = name.split("/")
-        if kind == "msg" or "_" in short:
+        package, kind, short = name.split("/")
+        whole, _, part = short.partition("_")
+        if kind == "msg" or part not in ("", "SendGoal", "GetResult"):
             return self.message_class(name)
         with self._lock:
             if name not in self._classes:
-                if name not in self._texts:
+                if f"{package}/{kind}/{whole}" not in self._texts:
                     raise KeyError(f"no interface named {name!r}")
-                self._classes[name] = make_group_class(name, self.message_class)
+                self._classes[name] = make_group_class(name, self.interface_class)
             return self._classes[name]
 
     def serializer(self, cls: type[Message]) -> Callable[[Any], bytes]:

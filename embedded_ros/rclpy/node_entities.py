@@ -137,7 +137,7 @@ class EntityHolder:
     ) -> Publisher:
         """Make a publisher; an int as QoS is the history depth.
 
-        :raises NoTypeSupportImportedException: ``msg_type`` is no message class.
+        :raises AttributeError: ``msg_type`` is no ROS interface.
         :raises InvalidTopicNameException: the topic name is invalid.
         """
         profile = self._profile(qos_profile)
@@ -174,7 +174,7 @@ class EntityHolder:
     ) -> Subscription:
         """Make a subscription; the callback takes the message, or message and message info.
 
-        :raises NoTypeSupportImportedException: ``msg_type`` is no message class.
+        :raises AttributeError: ``msg_type`` is no ROS interface.
         :raises InvalidTopicNameException: the topic name is invalid.
         """
         profile = self._profile(qos_profile)

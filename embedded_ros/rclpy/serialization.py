@@ -13,7 +13,7 @@ from .type_support import check_is_valid_msg_type
 def serialize_message(message: Any) -> bytes:
     """Encode a message, header included.
 
-    :raises TypeError: `message` is no ROS message.
+    :raises AttributeError: `message` is no ROS message.
     """
     check_is_valid_msg_type(type(message))
     return registry.serializer(type(message))(message)

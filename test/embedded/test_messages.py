@@ -8,15 +8,24 @@ import pickle
 
 import numpy as np
 import pytest
+from action_msgs.msg import GoalStatusArray
+from action_msgs.srv import CancelGoal
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Point, Pose, PoseWithCovariance, Quaternion, TransformStamped
 from nav_msgs.msg import OccupancyGrid
 from rcl_interfaces.msg import IntegerRange, ParameterDescriptor
+from rclpy.exceptions import NoTypeSupportImportedException
+from rclpy.type_support import (
+    check_for_type_support,
+    check_is_valid_msg_type,
+    check_is_valid_srv_type,
+)
 from sensor_msgs.msg import Image, JointState, NavSatStatus
 from shape_msgs.msg import SolidPrimitive
 from std_msgs.msg import Bool, ColorRGBA, Float32, Float64MultiArray, Int8, String, UInt8, UInt16
 from std_srvs.srv import SetBool, Trigger
+from tf2_msgs.action import LookupTransform
 from visualization_msgs.msg import Marker, MarkerArray
 
 
@@ -172,8 +181,46 @@ def test_services_group_their_messages():
     assert SetBool.Request(data=True).data is True
     response = Trigger.Response(success=True, message="done")
     assert (response.success, response.message) == (True, "done")
-    with pytest.raises(NotImplementedError):
+    with pytest.raises(NotImplementedError, match="Service classes can not be instantiated"):
         SetBool()
+    check_is_valid_srv_type(SetBool)
+    with pytest.raises(RuntimeError, match="message or action"):
+        check_is_valid_srv_type(SetBool.Request)
+    with pytest.raises(RuntimeError, match="service or action"):
+        check_is_valid_msg_type(SetBool)
+
+
+def test_actions_name_what_they_consist_of():
+    impl = LookupTransform.Impl
+    assert impl.CancelGoalService is CancelGoal
+    assert impl.GoalStatusMessage is GoalStatusArray
+    assert impl.SendGoalService.__name__ == "LookupTransform_SendGoal"
+    assert impl.SendGoalService.Request(goal=LookupTransform.Goal(advanced=True)).goal.advanced
+    assert isinstance(impl.GetResultService.Response().result, LookupTransform.Result)
+    assert impl.FeedbackMessage().feedback == LookupTransform.Feedback()
+    for service in (impl.SendGoalService, impl.GetResultService, impl.CancelGoalService):
+        check_is_valid_srv_type(service)
+    check_is_valid_msg_type(impl.FeedbackMessage)
+    check_for_type_support(LookupTransform)
+    with pytest.raises(RuntimeError):
+        check_is_valid_srv_type(LookupTransform)
+    with pytest.raises(NotImplementedError, match="Action classes can not be instantiated"):
+        LookupTransform()
+
+
+def test_what_is_no_interface_has_no_type_support():
+    class Foreign(type):
+        _TYPE_SUPPORT = None
+
+        @classmethod
+        def __import_type_support__(cls):
+            pass
+
+    for thing in (None, int):
+        with pytest.raises(AttributeError):
+            check_for_type_support(thing)
+    with pytest.raises(NoTypeSupportImportedException):
+        check_for_type_support(Foreign("Thing", (), {}))
 
 
 def test_module_contents():
