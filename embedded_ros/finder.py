@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The import hook: serves rclpy, tf2_ros and the interface packages under their own names.
+"""The import hook: serves rclpy, its companions and the interface packages under their own names.
 
 The hook is appended to ``sys.meta_path``, so anything really installed is found first.
 """
@@ -19,7 +19,7 @@ from .interfaces.classes import snake_case
 from .interfaces.registry import KINDS, Registry
 
 #: packages of this folder that are served under their top-level name
-FACADES = ("rclpy", "tf2_ros")
+FACADES = ("rclpy", "rosidl_parser", "rosidl_runtime_py", "tf2_ros")
 
 
 class _InterfaceLoader(Loader):

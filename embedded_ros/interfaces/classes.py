@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from .checks import NUMPY_TYPES, field_check
-from .spec import CODES, Field, MessageSpec
+from .spec import CODES, Field, FieldType, MessageSpec
 
 _UNSET: Any = object()
 
@@ -35,6 +35,38 @@ class MessageMeta(type):
         super().__setattr__(name, value)
 
 
+class _SlotTypes:
+    """Makes ``SLOT_TYPES`` when it is first asked for: tools want it, nodes do not."""
+
+    def __get__(self, instance: Any, cls: Any) -> tuple[Any, ...]:
+        types = tuple(_slot_type(member.type) for member in cls._spec_.fields)
+        cls.SLOT_TYPES = types
+        return types
+
+
+def _slot_type(ftype: FieldType) -> Any:
+    """A member's type as rosidl_parser describes it."""
+    from rosidl_parser import definition as parser
+
+    if ftype.kind == "array":
+        return parser.Array(_slot_type(ftype.scalar), ftype.size)
+    if ftype.kind == "sequence":
+        value = _slot_type(ftype.scalar)
+        if ftype.size:
+            return parser.BoundedSequence(value, ftype.size)
+        return parser.UnboundedSequence(value)
+    if ftype.is_message:
+        *namespaces, name = ftype.base.split("/")
+        return parser.NamespacedType(namespaces, name)
+    if ftype.base == "string":
+        bound = ftype.string_bound
+        return parser.BoundedString(bound) if bound else parser.UnboundedString()
+    if ftype.base == "wstring":
+        bound = ftype.string_bound
+        return parser.BoundedWString(bound) if bound else parser.UnboundedWString()
+    return parser.BasicType(ftype.idl_name())
+
+
 class Message(metaclass=MessageMeta):
     """Base of all message classes."""
 
@@ -42,6 +74,7 @@ class Message(metaclass=MessageMeta):
     _constants_: ClassVar[frozenset[str]] = frozenset()
     _fields_and_field_types: ClassVar[dict[str, str]] = {}
     _spec_: ClassVar[MessageSpec]
+    SLOT_TYPES: ClassVar[Any] = _SlotTypes()
 
     @classmethod
     def get_fields_and_field_types(cls) -> dict[str, str]:

@@ -85,6 +85,16 @@ class Registry:
             found |= {name for name in self._store.fielddefs if name.startswith(prefix)}
         return sorted(name[len(prefix) :] for name in found)
 
+    def path(self, name: str) -> Path | None:
+        """The file that defines an interface; None for those built in or unknown."""
+        source = self._texts.get(name, ("", "built in"))[1]
+        return None if source == "built in" else Path(source)
+
+    def folder(self, package: str) -> str:
+        """The folder a package was read from; empty for those built in."""
+        paths = (self.path(name) for name in self._texts if name.startswith(package + "/"))
+        return next((str(path.parents[1]) for path in paths if path), "")
+
     def spec(self, name: str) -> MessageSpec:
         """The specification of a message, or of a part of a service or action.
 

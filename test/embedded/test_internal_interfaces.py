@@ -10,7 +10,9 @@ import embedded_sample_msgs.action
 import embedded_sample_msgs.srv
 import numpy as np
 import pytest
+import yaml
 from embedded_sample_msgs.msg import Everything
+from rosidl_runtime_py import message_to_yaml, set_message_fields
 
 import embedded_ros
 from embedded_ros.finder import InterfaceFinder
@@ -191,3 +193,14 @@ def test_unknown_interfaces_are_key_errors():
     for name in ("std_msgs/msg/No", "std_srvs/srv/No_Request", "nothing/msg/X"):
         with pytest.raises(KeyError):
             registry.spec(name)
+
+
+def test_bytes_may_be_given_as_numbers_or_as_printed():
+    message = Everything()
+    set_message_fields(message, {"one": 2, "raw": [1, "\x02", b"\x03"]})
+    assert (message.one, message.raw) == (b"\x02", [b"\x01", b"\x02", b"\x03"])
+    again = Everything()
+    set_message_fields(again, yaml.safe_load(message_to_yaml(message)))
+    assert again == message
+    with pytest.raises(AssertionError, match="one"):
+        set_message_fields(message, {"one": 256})
