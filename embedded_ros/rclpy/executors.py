@@ -251,11 +251,11 @@ class Executor:
         waiter = self._waiter
         if waiter is None:
             return
-        entities = [entity for node in nodes for entity in node.queued_entities()]
-        waiter.set_readers({e.reader for e in entities if e.reader is not None})
-        waiter.wait(timeout)
-        for entity in entities:
-            entity.drain()
+        entities = {e.reader: e for node in nodes for e in node.queued_entities() if e.reader}
+        waiter.set_readers(set(entities))
+        for reader in waiter.wait(timeout):
+            if reader in entities:
+                entities[reader].drain()
 
     def _wait_for_ready_callbacks(
         self,

@@ -135,9 +135,9 @@ class Waiter(ABC):
         """Wait for exactly these readers from now on."""
 
     @abstractmethod
-    def wait(self, timeout: int | None) -> None:
-        """Return on samples, on a wake, or after `timeout` ns (None: after about 100 ms at the
-        latest).
+    def wait(self, timeout: int | None) -> list[Reader]:
+        """Return on samples, on a wake, or after `timeout` ns, and after about 100 ms at the
+        latest: the readers that have samples.
         """
 
     @abstractmethod

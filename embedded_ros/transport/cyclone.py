@@ -1,20 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
 """The transport over Cyclone DDS, used as a carrier of already encoded messages.
 
-Three habits of the Python binding shape this file. Listeners deadlock (a write holds the
-interpreter lock), so there are none: waiting is done in wait sets. Creating entities and reading
-their QoS back is not thread-
-safe, so one lock guards both. And a blocking call is deaf to signals, so waits are cut into slices
-of 100 ms.
+Some habits of the Python binding shape this file. Its write holds the interpreter lock, with which
+listeners deadlock and one stalled reader would stall every thread here: so there are no listeners,
+and writes and waits call the library itself (by ctypes, which lets other threads run). Creating
+entities and reading their QoS back is not thread-safe, so one lock guards both. And a blocking call
+is deaf to signals, so waits are cut into slices of 100 ms.
 """
 
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import threading
 import time
 from typing import Any
 
+from cyclonedds._clayer import ddspy_take
 from cyclonedds.builtin import (
     BuiltinDataReader,
     BuiltinTopicDcpsPublication,
@@ -30,7 +32,7 @@ from cyclonedds.core import (
     WaitSet,
 )
 from cyclonedds.domain import Domain, DomainParticipant
-from cyclonedds.internal import DDS, InvalidSample
+from cyclonedds.internal import DDS
 from cyclonedds.pub import DataWriter, Publisher
 from cyclonedds.qos import Policy
 from cyclonedds.qos import Qos as CycloneQos
@@ -46,11 +48,34 @@ from .cyclone_types import carrier, from_cyclone, to_cyclone
 SLICE = 100_000_000
 #: the binding gives the same handle as a signed number here and as an unsigned one there
 _UNSIGNED = 2**64 - 1
+_MANY = 64
 _ANY = SampleState.Any | ViewState.Any | InstanceState.Any
 
 _lock = threading.RLock()
 _domains: dict[int, tuple[str, Domain]] = {}
 _participants: dict[int, int] = {}
+
+
+class _Payload(ctypes.Structure):
+    """What the binding's data types take as a sample: an encoded message."""
+
+    _fields_ = (("data", ctypes.c_char_p), ("size", ctypes.c_size_t))
+
+
+def _function(name: str, *arguments: Any) -> Any:
+    """A function of the library; indexing gives one of our own, not that which the binding set."""
+    function = DDS._dll_handle[name]
+    function.argtypes = arguments
+    return function
+
+
+_write = _function("dds_write", ctypes.c_int32, ctypes.POINTER(_Payload))
+_assert_liveliness = _function("dds_assert_liveliness", ctypes.c_int32)
+_attach = _function("dds_waitset_attach", ctypes.c_int32, ctypes.c_int32, ctypes.c_ssize_t)
+_detach = _function("dds_waitset_detach", ctypes.c_int32, ctypes.c_int32)
+_wait = _function(
+    "dds_waitset_wait", ctypes.c_int32, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_int64
+)
 
 
 def _enter_domain(domain_id: int) -> None:
@@ -98,7 +123,6 @@ class CycloneWriter(Writer):
     def __init__(self, owner: CycloneParticipant, topic: Topic, qos: CycloneQos) -> None:
         self._owner = owner
         self._topic = topic
-        self._type = topic.data_type
         self._writer: Any = DataWriter(owner.publisher, topic, qos=qos)
         self.guid = self._writer.guid.bytes
         self.handle = self._writer.get_instance_handle() & _UNSIGNED
@@ -107,7 +131,11 @@ class CycloneWriter(Writer):
         )
 
     def write(self, payload: bytes) -> None:
-        self._writer.write(self._type(payload))
+        if rest := len(payload) % 4:
+            payload += bytes(4 - rest)
+        result = _write(self._writer._ref, _Payload(payload, len(payload)))
+        if result < 0:
+            raise DDSException(result, "while writing")
 
     def matched(self) -> int:
         with _lock:
@@ -134,8 +162,7 @@ class CycloneWriter(Writer):
                 return False
 
     def assert_liveliness(self) -> None:
-        # The binding has no method for it, the library it loads does.
-        result = DDS._dll_handle.dds_assert_liveliness(self._writer._ref)
+        result = _assert_liveliness(self._writer._ref)
         if result < 0:
             raise DDSException(result, "while asserting liveliness")
 
@@ -181,12 +208,14 @@ class CycloneReader(Reader):
         if reader is None:
             return []
         with uninterrupted():
-            taken = reader.take(limit)
+            taken = ddspy_take(reader._ref, _ANY, limit)
+        if isinstance(taken, int):
+            raise DDSException(taken, "while taking samples")
         now = time.time_ns()
         return [
-            Sample(s.payload, i.source_timestamp, now, i.publication_handle & _UNSIGNED)
-            for s in taken
-            if not isinstance(s, InvalidSample) and (i := s.sample_info)
+            Sample(payload, info.source_timestamp, now, info.publication_handle & _UNSIGNED)
+            for payload, info in taken
+            if info.valid_data
         ]
 
     def matched(self) -> int:
@@ -233,37 +262,46 @@ class CycloneWaiter(Waiter):
     def __init__(self, owner: CycloneParticipant) -> None:
         self._set: Any = WaitSet(owner.participant)
         self._guard: Any = GuardCondition(owner.participant)
-        self._set.attach(self._guard)
-        self._readers: set[Reader] = set()
+        _attach(self._set._ref, self._guard._ref, 0)
+        self._readers: dict[int, Reader] = {}  # by the handle of their condition
 
     def set_readers(self, readers: set[Reader]) -> None:
-        if readers == self._readers:
-            return
+        present = set(self._readers.values())
         with _lock:
-            for reader in self._readers - readers:
+            for reader in present - readers:
                 self.detach(reader)
-            for reader in readers - self._readers:
+            for reader in readers - present:
                 if isinstance(reader, CycloneReader) and reader.condition is not None and self._set:
-                    self._set.attach(reader.condition)
+                    handle = reader.condition._ref
+                    _attach(self._set._ref, handle, handle)
                     reader._waiters.add(self)
-                    self._readers.add(reader)
+                    self._readers[handle] = reader
 
     def detach(self, reader: Reader) -> None:
         """Stop waiting for `reader`."""
-        if isinstance(reader, CycloneReader) and reader in self._readers:
-            if self._set and reader.condition is not None:
-                self._set.detach(reader.condition)
+        if isinstance(reader, CycloneReader) and reader.condition is not None:
+            handle = reader.condition._ref
+            if self._readers.pop(handle, None) is not None and self._set:
+                _detach(self._set._ref, handle)
             reader._waiters.discard(self)
-            self._readers.discard(reader)
 
-    def wait(self, timeout: int | None) -> None:
+    def wait(self, timeout: int | None) -> list[Reader]:
         wait_set, guard = self._set, self._guard
         if wait_set is None:
-            return
-        # A participant that was closed meanwhile takes its wait sets along and ends their waits.
-        with contextlib.suppress(DDSException):
-            wait_set.wait(SLICE if timeout is None else min(max(timeout, 0), SLICE))
-            guard.take()
+            return []
+        limit = SLICE if timeout is None else min(max(timeout, 0), SLICE)
+        found = (ctypes.c_ssize_t * _MANY)()
+        # A participant that was closed meanwhile takes its wait sets along and ends their waits:
+        # the count is negative then.
+        count = _wait(wait_set._ref, found, _MANY, limit)
+        handles = found[: max(count, 0)]
+        if 0 in handles or count > _MANY:
+            with contextlib.suppress(DDSException):
+                guard.take()
+        readers = self._readers
+        if count > _MANY:
+            return list(readers.values())
+        return [readers[handle] for handle in handles if handle in readers]
 
     def wake(self) -> None:
         guard = self._guard
@@ -273,10 +311,8 @@ class CycloneWaiter(Waiter):
 
     def close(self) -> None:
         with _lock:
-            for reader in list(self._readers):
+            for reader in list(self._readers.values()):
                 self.detach(reader)
-            if self._set is not None and self._guard is not None:
-                self._set.detach(self._guard)
             self._set = None
             self._guard = None
 
