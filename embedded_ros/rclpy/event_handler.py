@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
@@ -15,7 +14,7 @@ from .logging import get_logger
 from .qos import QoSPolicyKind, qos_policy_name_from_kind
 from .waitable import Waitable
 
-#: how often a status is looked at, s
+#: how often executors look at statuses, s
 POLL_PERIOD = 0.1
 
 #: DDS policy ids
@@ -109,19 +108,13 @@ class EventHandler(Waitable):
         self._entity = entity
         self._kind = kind
         self._pending: StatusChange | None = None
-        self._next_poll = 0.0
         self._last_current = 0
 
     def is_ready(self, wait_set: Any) -> bool:
         if self._pending is None:
-            now = time.monotonic()
-            if now >= self._next_poll:
-                self._next_poll = now + POLL_PERIOD
-                status = self._entity.status(self._kind)
-                if status.change or (
-                    self._kind == "matched" and status.detail != self._last_current
-                ):
-                    self._pending = status
+            status = self._entity.status(self._kind)
+            if status.change or (self._kind == "matched" and status.detail != self._last_current):
+                self._pending = status
         return self._pending is not None
 
     def take_data(self) -> Any:

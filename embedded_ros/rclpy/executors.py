@@ -13,9 +13,12 @@ from typing import TYPE_CHECKING, Any
 
 from embedded_ros.transport import Waiter
 
+from .event_handler import POLL_PERIOD
 from .exceptions import InvalidHandle
+from .guard_condition import GuardCondition
 from .impl.executor_parts import (
     ConditionReachedException,
+    Entities,
     ExternalShutdownException,
     ShutdownException,
     TimeoutException,
@@ -24,6 +27,7 @@ from .impl.executor_parts import (
 )
 from .impl.queued import Work, await_or_execute
 from .task import Future, Task
+from .timer import Timer
 from .utilities import get_default_context, timeout_sec_to_nsec
 
 if TYPE_CHECKING:
@@ -39,6 +43,10 @@ __all__ = [
     "TimeoutException",
     "TimeoutObject",
 ]
+
+
+#: how often news of the graph are taken in, s; what nobody takes piles up
+GRAPH_PERIOD = 1.0
 
 
 class Executor:
@@ -57,6 +65,9 @@ class Executor:
         self._work_tracker = WorkTracker()
         self._work: Iterator[tuple[Task, Any, Any]] | None = None
         self._work_arguments: Any = None
+        self._changes = 0
+        self._entities: Entities | None = None
+        self._next_poll = self._next_graph_poll = 0.0
         self._context.add_waker(self)
 
     @property
@@ -83,7 +94,7 @@ class Executor:
         waiter, self._waiter = self._waiter, None
         if waiter is not None:
             waiter.close()
-        self._work = None
+        self._work = self._entities = None
         return True
 
     def add_node(self, node: Node) -> bool:
@@ -104,14 +115,15 @@ class Executor:
         self.wake()
 
     def wake(self) -> None:
-        """Have the executor look for work again."""
-        waiter = self._waiter
-        if waiter is not None:
-            waiter.wake()
+        """Have the executor look for work again, and for entities that were added or removed."""
+        self._changes += 1
+        self._progress()
 
     def _progress(self) -> None:
         """An entity or callback group became free: threads of a pool tell the one that waits."""
-        self.wake()
+        waiter = self._waiter
+        if waiter is not None:
+            waiter.wake()
 
     def get_nodes(self) -> list[Node]:
         """The nodes in this executor."""
@@ -201,24 +213,34 @@ class Executor:
         data = waitable.take_data()
         return lambda: waitable.execute(data)
 
-    def _ready(self, nodes: list[Node]) -> Iterator[tuple[Task, Any, Any]]:
-        """Claim and yield what is ready now, at most one callback per entity: events, timers, then
-        messages.
+    def _gather(self, nodes: list[Node]) -> Entities:
+        """The entities of the nodes, gathered anew only after a change."""
+        entities, changes = self._entities, self._changes
+        if entities is None or entities.changes != changes or entities.nodes != nodes:
+            entities = self._entities = Entities(changes, nodes)
+        return entities
+
+    def _ready(self, entities: Entities) -> Iterator[tuple[Task, Any, Any]]:
+        """Claim and yield what is ready now, at most one callback per entity: events, then node by
+        node timers, messages and guard conditions.
         """
-        for node in nodes:
-            for waitable in list(node.waitables):
-                if self.can_execute(waitable) and waitable.is_ready(None):
-                    yield self._claim(waitable, node, lambda w=waitable: self._take_waitable(w))  # type: ignore[misc]
-        for node in nodes:
-            for timer in list(node.timers):
-                if not timer._destroyed and self.can_execute(timer) and timer.is_ready():
-                    yield self._claim(timer, node, lambda t=timer: self._take_timer(t))  # type: ignore[misc]
-            for entity in node.queued_entities():
-                if entity.has_work() and self.can_execute(entity):
-                    yield self._claim(entity, node, entity.take_work)
-            for guard in list(node.guards):
-                if guard._executor_triggered and self.can_execute(guard):
-                    yield self._claim(guard, node, lambda g=guard: self._take_guard(g))  # type: ignore[misc]
+        waitables = entities.waitables
+        if (now := time.monotonic()) >= self._next_poll:
+            self._next_poll = now + POLL_PERIOD
+            waitables = entities.events + waitables
+        for waitable, node in waitables:
+            if self.can_execute(waitable) and waitable.is_ready(None):
+                yield self._claim(waitable, node, lambda w=waitable: self._take_waitable(w))  # type: ignore[misc]
+        for place in entities.candidates():
+            entity, node = entities.others[place]
+            if isinstance(entity, Timer):
+                if not entity._destroyed and self.can_execute(entity) and entity.is_ready():
+                    yield self._claim(entity, node, lambda t=entity: self._take_timer(t))  # type: ignore[misc]
+            elif isinstance(entity, GuardCondition):
+                if entity._executor_triggered and self.can_execute(entity):
+                    yield self._claim(entity, node, lambda g=entity: self._take_guard(g))  # type: ignore[misc]
+            elif entity.has_work() and self.can_execute(entity):
+                yield self._claim(entity, node, entity.take_work)
 
     def _claim(
         self, entity: Any, node: Node, take: Callable[[], Work | None]
@@ -235,27 +257,33 @@ class Executor:
                 task._queued = True
                 yield task, entity, node
 
-    def _next_timer(self, nodes: list[Node]) -> int | None:
+    def _next_timer(self, entities: Entities) -> int | None:
         """Nanoseconds until the next timer that may run, or None."""
         soonest = None
-        for node in nodes:
-            for timer in list(node.timers):
-                if timer._destroyed or not self.can_execute(timer):
-                    continue
-                left = timer.time_until_next_call()
-                if left is not None and (soonest is None or left < soonest):
-                    soonest = left
+        for timer in entities.timers:
+            if timer._destroyed or not self.can_execute(timer):
+                continue
+            left = timer.time_until_next_call()
+            if left is not None and (soonest is None or left < soonest):
+                soonest = left
         return soonest
 
-    def _wait(self, nodes: list[Node], timeout: int | None) -> None:
+    def _wait(self, entities: Entities, timeout: int | None) -> None:
         waiter = self._waiter
         if waiter is None:
             return
-        entities = {e.reader: e for node in nodes for e in node.queued_entities() if e.reader}
-        waiter.set_readers(set(entities))
+        if entities.waiter is not waiter:
+            entities.waiter = waiter
+            waiter.set_readers(set(entities.readers))
         for reader in waiter.wait(timeout):
-            if reader in entities:
-                entities[reader].drain()
+            place = entities.readers.get(reader)
+            if place is not None:
+                entities.others[place][0].drain()
+                entities.queued.add(place)
+        if (now := time.monotonic()) >= self._next_graph_poll:
+            self._next_graph_poll = now + GRAPH_PERIOD
+            if (graph := self._context._graph) is not None:
+                graph.keep_up()
 
     def _wait_for_ready_callbacks(
         self,
@@ -274,18 +302,19 @@ class Executor:
             for item in self._pending_tasks(used):
                 found = True
                 yield item
-            wait = self._next_timer(used)
-            if any(e.has_work() and self.can_execute(e) for n in used for e in n.queued_entities()):
+            entities = self._gather(used)
+            wait = self._next_timer(entities)
+            if any(e.has_work() and self.can_execute(e) for e in entities.waiting()):
                 wait = 0
             if end is not None:
                 left = max(end - time.monotonic_ns(), 0)
                 wait = left if wait is None else min(wait, left)
-            self._wait(used, wait)
+            self._wait(entities, wait)
             if self._is_shutdown:
                 raise ShutdownException()
             if not self._context.ok():
                 raise ExternalShutdownException()
-            for item in self._ready(used):
+            for item in self._ready(entities):
                 found = True
                 yield item
             if not found and end is not None and time.monotonic_ns() >= end:

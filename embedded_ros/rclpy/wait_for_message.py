@@ -30,6 +30,7 @@ def wait_for_message(
     subscription = node.create_subscription(msg_type, topic, lambda _: None, qos_profile)
     # The executor must not take what this function waits for.
     node._subscriptions.remove(subscription)
+    node._wake_executor()
     end = None if time_to_wait < 0 else time.monotonic() + time_to_wait
     context.add_waker(waiter)
     try:

@@ -7,15 +7,17 @@ Endpoints come from discovery; which node they belong to is told by the transien
 
 from __future__ import annotations
 
+import struct
 import threading
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import Any
 
 from ..interfaces.registry import registry
 from .base import Endpoint, Participant, Qos
 
 DISCOVERY_TYPE = "rmw_dds_common/msg/ParticipantEntitiesInfo"
+#: announcements that are kept undecoded while nobody asks for the nodes
+_MANY_NEWS = 100
 _PREFIXES = {"rt": "topic", "rq": "request", "rr": "reply"}
 
 
@@ -71,11 +73,10 @@ class Graph:
         self._lock = threading.RLock()
         self._nodes: list[NodeEntry] = []
         self._others: dict[bytes, list[NodeEntry]] = {}
-        cls = registry.message_class(DISCOVERY_TYPE)
+        self._news: dict[int, bytes] = {}
+        self._asked = False
         type_hash = registry.type_hash(DISCOVERY_TYPE)
-        self._info: Any = cls
-        self._serialize = registry.serializer(cls)
-        self._deserialize = registry.deserializer(cls)
+        self._deserialize = registry.deserializer(registry.message_class(DISCOVERY_TYPE))
         arguments = ("ros_discovery_info", dds_type_name(DISCOVERY_TYPE), type_hash)
         self._writer = participant.create_writer(*arguments, Qos(transient_local=True, depth=1))
         self._reader = participant.create_reader(
@@ -97,25 +98,40 @@ class Graph:
             self.announce()
 
     def announce(self) -> None:
-        """Publish the present list of nodes; call it after changing an entry."""
-        with self._lock:
-            message = self._info()
-            _set_gid(message.gid, self._participant.guid)
-            node_type: Any = registry.message_class("rmw_dds_common/msg/NodeEntitiesInfo")
-            for entry in self._nodes:
-                node = node_type(node_namespace=entry.namespace, node_name=entry.name)
-                node.reader_gid_seq = [_make_gid(guid) for guid in entry.readers]
-                node.writer_gid_seq = [_make_gid(guid) for guid in entry.writers]
-                message.node_entities_info_seq.append(node)
-            self._writer.write(self._serialize(message))
+        """Publish the present list of nodes; call it after changing an entry.
 
-    def _read_others(self) -> None:
-        for sample in self._reader.take(1000):
+        A process announces once for everything that it makes, so this is encoded by hand.
+        """
+        with self._lock:
+            parts = [b"\0\1\0\0", self._participant.guid, struct.pack("<I", len(self._nodes))]
+            for entry in self._nodes:
+                parts += [_string(entry.namespace), _string(entry.name)]
+                for guids in (entry.readers, entry.writers):
+                    parts += [struct.pack("<I", len(guids)), *guids]
+            self._writer.write(b"".join(parts))
+            self.keep_up()
+
+    def keep_up(self) -> None:
+        """Take in what others announced, of which only the newest matters; else it piles up."""
+        with self._lock:
+            self._take_news()
+            if self._asked:
+                self._participant.endpoints()
+            if len(self._news) > _MANY_NEWS:
+                self.nodes()
+
+    def _take_news(self) -> None:
+        while samples := self._reader.take(256):
+            self._news.update((sample.writer, sample.payload) for sample in samples)
+
+    def _read_news(self) -> None:
+        news, self._news = self._news, {}
+        for payload in news.values():
             try:
-                message = self._deserialize(sample.payload)
+                message = self._deserialize(payload)
             except ValueError:
                 continue
-            entries = [
+            self._others[message.gid.data.tobytes()] = [
                 NodeEntry(
                     node.node_namespace,
                     node.node_name,
@@ -124,17 +140,19 @@ class Graph:
                 )
                 for node in message.node_entities_info_seq
             ]
-            self._others[message.gid.data.tobytes()] = entries
 
     def endpoints(self) -> list[Endpoint]:
         """All endpoints in the domain."""
+        self._asked = True
         return self._participant.endpoints()
 
     def nodes(self) -> list[NodeEntry]:
         """All nodes whose participant is alive, this process's included."""
         with self._lock:
+            self._take_news()
+            # Asked for after the news: whose announcement came is known by then.
             alive = {endpoint.participant for endpoint in self.endpoints()}
-            self._read_others()
+            self._read_news()
             self._others = {guid: nodes for guid, nodes in self._others.items() if guid in alive}
             mine = self._participant.guid
             others = [n for guid, nodes in self._others.items() if guid != mine for n in nodes]
@@ -150,11 +168,6 @@ class Graph:
         self._reader.close()
 
 
-def _set_gid(gid: Any, guid: bytes) -> None:
-    gid.data = list(guid)
-
-
-def _make_gid(guid: bytes) -> Any:
-    gid: Any = registry.message_class("rmw_dds_common/msg/Gid")()
-    _set_gid(gid, guid)
-    return gid
+def _string(text: str) -> bytes:
+    data = text.encode() + b"\0"
+    return struct.pack("<I", len(data)) + data + bytes(-len(data) % 4)

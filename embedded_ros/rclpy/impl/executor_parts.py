@@ -4,6 +4,15 @@
 from __future__ import annotations
 
 import threading
+from typing import TYPE_CHECKING, Any
+
+from embedded_ros.transport import Reader, Waiter
+
+from ..event_handler import EventHandler
+from ..timer import Timer
+
+if TYPE_CHECKING:
+    from ..node import Node
 
 
 class TimeoutException(Exception):
@@ -53,3 +62,44 @@ class WorkTracker:
             timeout_sec = None
         with self._condition:
             return self._condition.wait_for(lambda: self._running == 0, timeout_sec)
+
+
+class Entities:
+    """What the executor looks after, in the order in which it serves it, so that a turn need only
+    look at timers, guard conditions and what has messages.
+    """
+
+    def __init__(self, changes: int, nodes: list[Node]) -> None:
+        self.changes = changes
+        self.nodes = nodes
+        self.waiter: Waiter | None = None
+        waitables = [(waitable, node) for node in nodes for waitable in node.waitables]
+        #: looked at now and then only
+        self.events = [pair for pair in waitables if isinstance(pair[0], EventHandler)]
+        self.waitables = [pair for pair in waitables if not isinstance(pair[0], EventHandler)]
+        #: all but waitables
+        self.others: list[tuple[Any, Node]] = []
+        self.readers: dict[Reader, int] = {}
+        #: places in `others` of what may have messages, and of timers and guard conditions
+        self.queued: set[int] = set()
+        self._always: list[int] = []
+        for node in nodes:
+            for entity in (*node.timers, *node.queued_entities(), *node.guards):
+                place = len(self.others)
+                self.others.append((entity, node))
+                reader = getattr(entity, "reader", None)
+                if reader is None:
+                    self._always.append(place)
+                else:
+                    self.readers[reader] = place
+                    self.queued.add(place)
+        self.timers = [entity for entity, _ in self.others if isinstance(entity, Timer)]
+
+    def waiting(self) -> list[Any]:
+        """The entities that have messages."""
+        self.queued = {place for place in self.queued if self.others[place][0].has_work()}
+        return [self.others[place][0] for place in self.queued]
+
+    def candidates(self) -> list[int]:
+        """The places of what may be ready."""
+        return sorted((*self._always, *self.queued))
