@@ -21,8 +21,10 @@ class RuntimeMissing(CcrError):
 
 def real_ros() -> bool:
     """Tell whether a real ``rclpy`` is on the path (as in a shell with ROS 2 sourced)."""
-    # PathFinder looks at sys.path only, so that the embedded runtime never answers for ROS.
-    return PathFinder.find_spec("rclpy") is not None
+    # PathFinder looks at sys.path only, so that the embedded runtime never answers for ROS. A
+    # folder rclpy without __init__.py, as beside a checkout of its sources, has no origin.
+    spec = PathFinder.find_spec("rclpy")
+    return spec is not None and spec.origin is not None
 
 
 def enable_ros() -> bool:

@@ -44,6 +44,25 @@ def interface_folders(path: Path | str) -> list[Path]:
     ]
 
 
+def _is_ours(finder: object) -> bool:
+    return type(finder).__name__ == "InterfaceFinder"
+
+
+def installed(name: str) -> bool:
+    """Whether the top-level package `name` is served by another than this runtime.
+
+    Folders without ``__init__.py`` are not, though Python takes them for packages when a program
+    runs beside them (in a checkout of common_interfaces, say); nor are unbuilt sources of rclpy.
+    """
+    others = [finder for finder in sys.meta_path if not _is_ours(finder)]
+    spec = next(filter(None, (finder.find_spec(name, None) for finder in others)), None)
+    if spec is None or spec.origin is None:
+        return False
+    folder = Path(spec.origin).parent
+    sources = name == "rclpy" and (folder / "impl" / "implementation_singleton.py").is_file()
+    return not sources or any(folder.glob("_rclpy_pybind11*"))
+
+
 def enable(interface_paths: Sequence[Path | str] = ()) -> bool:
     """Serve rclpy and the interface packages, unless a real rclpy is installed.
 
@@ -54,9 +73,9 @@ def enable(interface_paths: Sequence[Path | str] = ()) -> bool:
     :raises MissingDependencyError: a needed package is not installed.
     :raises FileNotFoundError: an interface path is no folder.
     """
-    finder = next((f for f in sys.meta_path if type(f).__name__ == "InterfaceFinder"), None)
+    finder = next((f for f in sys.meta_path if _is_ours(f)), None)
     if finder is None:
-        if "rclpy" in sys.modules or importlib.util.find_spec("rclpy") is not None:
+        if "rclpy" in sys.modules or installed("rclpy"):
             return False
         missing = [
             need for name, need in _REQUIRED.items() if importlib.util.find_spec(name) is None
@@ -72,7 +91,7 @@ def enable(interface_paths: Sequence[Path | str] = ()) -> bool:
         from .interfaces.registry import registry
 
         finder = InterfaceFinder(registry)
-        sys.meta_path.append(finder)
+        sys.meta_path.insert(0, finder)
     folders = [folder for path in interface_paths for folder in interface_folders(path)]
     finder.add_packages(folders)  # type: ignore[attr-defined]
     return True

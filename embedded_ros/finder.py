@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The import hook: serves rclpy, its companions and the interface packages under their own names.
-
-The hook is appended to ``sys.meta_path``, so anything really installed is found first.
+"""The import hook: serves rclpy, its companions and the interface packages under their own names,
+unless they are installed.
 """
 
 from __future__ import annotations
@@ -15,6 +14,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from . import installed
 from .interfaces.classes import snake_case
 from .interfaces.registry import KINDS, Registry
 
@@ -99,11 +99,13 @@ class InterfaceFinder(MetaPathFinder):
         target: ModuleType | None = None,
     ) -> ModuleSpec | None:
         parts = fullname.split(".")
+        if parts[0] not in FACADES and (parts[0] not in self.packages or len(parts) > 3):
+            return None
+        if installed(fullname) if len(parts) == 1 else self._foreign(parts[0]):
+            return None
         if parts[0] in FACADES:
             # Submodules are found by the ordinary path finder through the package's __path__.
             return self._facade(fullname) if len(parts) == 1 else None
-        if parts[0] not in self.packages or len(parts) > 3:
-            return None
         package = parts[0]
         if len(parts) > 1 and (parts[1] not in KINDS or not self.registry.names(package, parts[1])):
             return None
@@ -112,6 +114,10 @@ class InterfaceFinder(MetaPathFinder):
         }:
             return None
         return ModuleSpec(fullname, self.loader, is_package=len(parts) < 3)
+
+    def _foreign(self, package: str) -> bool:
+        spec = sys.modules[package].__spec__
+        return package not in FACADES and (spec is None or spec.loader is not self.loader)
 
     @staticmethod
     def _facade(name: str) -> ModuleSpec | None:

@@ -126,6 +126,26 @@ def test_a_real_rclpy_is_left_alone(tmp_path):
     subprocess.run([sys.executable, "-c", program], check=True)
 
 
+def test_folders_that_only_look_like_packages_hide_nothing(tmp_path):
+    (tmp_path / "std_msgs" / "msg").mkdir(parents=True)
+    (tmp_path / "rclpy" / "impl").mkdir(parents=True)
+    (tmp_path / "sensor_msgs").mkdir()
+    (tmp_path / "sensor_msgs" / "__init__.py").touch()
+    (tmp_path / "sensor_msgs" / "msg.py").write_text("REAL = True\n")
+    program = (
+        f"import sys; sys.path[:0] = [{str(tmp_path)!r}, {str(ROOT)!r}]\n"
+        "import embedded_ros\n"
+        "assert embedded_ros.enable()\n"
+        "import std_msgs.msg, rclpy.node, sensor_msgs.msg\n"
+        "assert std_msgs.msg.String(data='a').data == 'a'\n"
+        "assert sensor_msgs.msg.REAL\n"
+    )
+    subprocess.run([sys.executable, "-c", program], check=True)
+    for name in ("__init__.py", "impl/implementation_singleton.py"):  # sources that were not built
+        (tmp_path / "rclpy" / name).write_text("raise ImportError\n")
+    subprocess.run([sys.executable, "-c", program], check=True)
+
+
 def test_missing_dependencies_are_named():
     program = (
         f"import sys; sys.path.insert(0, {str(ROOT)!r})\n"
