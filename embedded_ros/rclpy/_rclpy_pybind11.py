@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Error classes that code imports from rclpy's compiled module."""
+"""What code imports from rclpy's compiled module: mostly error classes."""
 
 from __future__ import annotations
+
+import importlib
+from typing import Any
 
 from .exceptions import InvalidHandle
 
@@ -29,6 +32,15 @@ class UnsupportedEventTypeError(RCLError):
 class InvalidArgument(ValueError):
     """An argument is invalid."""
 
+
+def __getattr__(name: str) -> Any:
+    """Classes of this runtime that rclpy has in its compiled module."""
+    if name not in _ELSEWHERE:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(_ELSEWHERE[name], __package__), name)
+
+
+_ELSEWHERE = {"EventHandle": ".event_handler", "rmw_qos_profile_t": ".qos"}
 
 __all__ = [
     "InvalidArgument",

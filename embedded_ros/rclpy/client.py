@@ -97,7 +97,7 @@ class Client(ServiceEnd):
 
     def service_is_ready(self) -> bool:
         """Whether a server listens to this client, and this client to it."""
-        readers, writers = self.handle._writer.peers(), self.handle._reader.peers()
+        readers, writers = self.handle._writer.peers(), self._endpoint.peers()
         servers = self._peer_ids(readers, "serviceid")
         if not servers:
             # Servers of other middlewares announce no identity.
@@ -116,8 +116,7 @@ class Client(ServiceEnd):
 
     def drain(self) -> None:
         """Fetch what has arrived, without the responses to other clients."""
-        reader = self._reader
-        for sample in reader.take(256) if reader is not None else ():
+        for sample in self._endpoint.take(256):
             try:
                 guid = unpack(sample.payload)[0].writer_guid
             except ValueError:

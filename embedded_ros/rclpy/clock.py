@@ -10,6 +10,7 @@ from enum import IntEnum
 from typing import Any
 
 from .clock_type import ClockType
+from .destroyable import Destroyable
 from .duration import Duration
 from .exceptions import NotInitializedException
 from .time import Time
@@ -115,7 +116,7 @@ class JumpHandle:
         self.unregister()
 
 
-class Clock:
+class Clock(Destroyable):
     """A source of time. ``Clock(clock_type=ClockType.ROS_TIME)`` gives a :class:`ROSClock`."""
 
     def __new__(cls, *, clock_type: ClockType = ClockType.SYSTEM_TIME) -> Clock:

@@ -17,6 +17,7 @@ from embedded_ros.transport import Participant, open_participant
 from embedded_ros.transport.graph import Graph
 
 from ._rclpy_pybind11 import RCLError
+from .destroyable import Destroyable
 from .exceptions import NotInitializedException
 from .impl.arguments import RosArguments, parse_arguments
 
@@ -36,6 +37,17 @@ def _domain_from_environment() -> int:
             f"ROS_DOMAIN_ID is {text!r}; it must be a whole number from 0 to {_MAX_DOMAIN}"
         )
     return int(text)
+
+
+class ContextHandle(Destroyable):
+    """An initialised context."""
+
+    def __init__(self, context: Context) -> None:
+        self.context = context
+
+    def ok(self) -> bool:
+        """Whether it is not shut down."""
+        return self.context.ok()
 
 
 class Context:
@@ -60,9 +72,9 @@ class Context:
         self.nodes: weakref.WeakSet[Node] = weakref.WeakSet()
 
     @property
-    def handle(self) -> Context | None:
-        """The context itself once initialised."""
-        return self if self._initialized else None
+    def handle(self) -> ContextHandle | None:
+        """What stands for the context once it is initialised."""
+        return ContextHandle(self) if self._initialized else None
 
     def init(
         self,

@@ -171,23 +171,22 @@ class Executor:
                 entity._executor_event = False
                 self._progress()
                 return
-            with self._work_tracker:
+            try:
                 try:
-                    try:
-                        work = take()
-                    except InvalidHandle:
-                        # Destroyed between becoming ready and being run.
-                        work = None
-                    entity._executor_event = False
-                    self._progress()
-                    if work is not None:
-                        result = work()
-                        if hasattr(result, "__await__"):
-                            await result
-                finally:
-                    entity._executor_event = False
-                    group.ending_execution(entity)
-                    self._progress()
+                    work = take()
+                except InvalidHandle:
+                    # Destroyed between becoming ready and being run.
+                    work = None
+                entity._executor_event = False
+                self._progress()
+                if work is not None:
+                    result = work()
+                    if hasattr(result, "__await__"):
+                        await result
+            finally:
+                entity._executor_event = False
+                group.ending_execution(entity)
+                self._progress()
 
         task = Task(run, executor=self)
         task._queued = True
@@ -363,7 +362,7 @@ class SingleThreadedExecutor(Executor):
             task, _, _ = self.wait_for_ready_callbacks(timeout_sec, None, wait_condition)
         except (ShutdownException, TimeoutException, ConditionReachedException):
             return
-        task()
+        self._work_tracker.run(task)
         if task.done():
             task.result()
 
@@ -408,7 +407,7 @@ class MultiThreadedExecutor(Executor):
             ConditionReachedException,
         ):
             return
-        self._executor.submit(task)
+        self._executor.submit(self._work_tracker.run, task)
         self._futures.append(task)
         for future in self._futures[:]:
             if future.done():

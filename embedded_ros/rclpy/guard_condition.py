@@ -6,11 +6,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from .exceptions import InvalidHandle
+from .destroyable import Destroyable
 from .utilities import get_default_context
 
 
-class GuardCondition:
+class GuardCondition(Destroyable):
     """Runs its callback in the executor after :meth:`trigger`."""
 
     def __init__(
@@ -21,7 +21,6 @@ class GuardCondition:
         self.callback_group = callback_group
         self._executor_event = False
         self._executor_triggered = False
-        self._destroyed = False
         self._wake: Callable[[], None] | None = None
 
     def trigger(self) -> None:
@@ -29,12 +28,6 @@ class GuardCondition:
 
         :raises InvalidHandle: the guard condition was destroyed.
         """
-        if self._destroyed:
-            raise InvalidHandle("cannot use Destroyable because destruction was requested")
-        self._executor_triggered = True
+        self.handle._executor_triggered = True
         if self._wake is not None:
             self._wake()
-
-    def destroy(self) -> None:
-        """Give up the guard condition."""
-        self._destroyed = True

@@ -11,7 +11,8 @@ from embedded_ros.interfaces.registry import registry
 from ._rclpy_pybind11 import NodeNameNonExistentError
 from .callback_groups import CallbackGroup
 from .clock import Clock, ROSClock
-from .exceptions import InvalidHandle, NotInitializedException
+from .destroyable import Destroyable
+from .exceptions import NotInitializedException
 from .executors import Executor
 from .expand_topic_name import expand_topic_name
 from .impl.arguments import NodeArguments, parse_arguments
@@ -33,7 +34,7 @@ from .validate_topic_name import validate_topic_name
 __all__ = ["Node", "NodeNameNonExistentError"]
 
 
-class Node(ParameterHolder, EntityHolder, GraphViewer):
+class Node(ParameterHolder, EntityHolder, GraphViewer, Destroyable):
     """A participant of the ROS graph: it makes publishers, subscriptions and timers and holds
     parameters.
     """
@@ -67,7 +68,7 @@ class Node(ParameterHolder, EntityHolder, GraphViewer):
         if not self._context.ok():
             raise NotInitializedException("cannot create node")
         self._executor_ref: weakref.ref[Executor] | None = None
-        self._destroyed = self._released = False
+        self._released = False
 
         sources = [self._context.arguments] if use_global_arguments else []
         if cli_args:
@@ -124,16 +125,6 @@ class Node(ParameterHolder, EntityHolder, GraphViewer):
     def context(self) -> Any:
         """The context of the node."""
         return self._context
-
-    @property
-    def handle(self) -> Node:
-        """The node itself.
-
-        :raises InvalidHandle: it was destroyed.
-        """
-        if self._destroyed:
-            raise InvalidHandle("cannot use Destroyable because destruction was requested")
-        return self
 
     @property
     def default_callback_group(self) -> CallbackGroup:

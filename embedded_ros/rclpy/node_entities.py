@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any, cast
 
@@ -19,6 +20,7 @@ from .impl.queued import QueuedEntity
 from .impl.rcutils_logger import RcutilsLogger
 from .publisher import Publisher
 from .qos import QoSProfile, qos_profile_services_default
+from .qos_overriding_options import QoSOverridingOptions, _declare_qos_parameters
 from .service import Service
 from .subscription import Subscription
 from .timer import Rate, Timer
@@ -103,14 +105,25 @@ class EntityHolder:
         self._waitables.remove(waitable)
         self._wake_executor()
 
-    @staticmethod
-    def _profile(qos_or_depth: QoSProfile | int) -> QoSProfile:
+    def _profile(
+        self,
+        qos_or_depth: QoSProfile | int,
+        kind: type[Publisher | Subscription],
+        full_topic: str,
+        options: QoSOverridingOptions | None,
+    ) -> QoSProfile:
+        """A profile from what was given and, where options say so, from parameters."""
         if isinstance(qos_or_depth, QoSProfile):
-            return qos_or_depth
+            if options is None:
+                return qos_or_depth
+            profile = copy.copy(qos_or_depth)
+            _declare_qos_parameters(kind, cast("Node", self), full_topic, profile, options)
+            return profile
         if isinstance(qos_or_depth, int):
             if qos_or_depth < 0:
                 raise ValueError("history depth must be greater than or equal to zero")
-            return QoSProfile(depth=qos_or_depth)
+            profile = QoSProfile(depth=qos_or_depth)
+            return self._profile(profile, kind, full_topic, options)
         raise TypeError(f"Expected QoSProfile or int, but received {type(qos_or_depth)!r}")
 
     def _announce(self, writer: Any = None, reader: Any = None, remove: bool = False) -> None:
@@ -132,31 +145,30 @@ class EntityHolder:
         *,
         callback_group: CallbackGroup | None = None,
         event_callbacks: PublisherEventCallbacks | None = None,
-        qos_overriding_options: Any = None,
+        qos_overriding_options: QoSOverridingOptions | None = None,
         publisher_class: type[Publisher] = Publisher,
     ) -> Publisher:
         """Make a publisher; an int as QoS is the history depth.
 
         :raises AttributeError: ``msg_type`` is no ROS interface.
         :raises InvalidTopicNameException: the topic name is invalid.
+        :raises InvalidQosOverridesError: the options' callback refuses what parameters ask for.
         """
-        profile = self._profile(qos_profile)
-        check_is_valid_msg_type(msg_type)
         full = self._full_name(topic)
-        dds_topic = full[1:] if profile.avoid_ros_namespace_conventions else "rt" + full
-        peers = self._peer_qos(dds_topic, readers=True, profile=profile)
-        name = msg_type._spec_.name
-        writer = self._context.participant.create_writer(
-            dds_topic, dds_type_name(name), registry.type_hash(name), profile.decide(peers, True)
-        )
-        group = callback_group or self._default_callback_group
-        callbacks = event_callbacks or PublisherEventCallbacks()
+        profile = self._profile(qos_profile, Publisher, full, qos_overriding_options)
+        writer = self._open(msg_type, full, profile, writer=True)
         publisher = publisher_class(
-            writer, msg_type, topic, full, profile, callbacks, group, self._logger
+            writer,
+            msg_type,
+            topic,
+            full,
+            profile,
+            event_callbacks=event_callbacks or PublisherEventCallbacks(),
+            callback_group=callback_group or self._default_callback_group,
+            logger_name=self._logger.name,
         )
         self._publishers.append(publisher)
         self._waitables.extend(publisher.event_handlers)
-        self._announce(writer=writer)
         self._wake_executor()
         return publisher
 
@@ -169,41 +181,50 @@ class EntityHolder:
         *,
         callback_group: CallbackGroup | None = None,
         event_callbacks: SubscriptionEventCallbacks | None = None,
-        qos_overriding_options: Any = None,
+        qos_overriding_options: QoSOverridingOptions | None = None,
         raw: bool = False,
     ) -> Subscription:
         """Make a subscription; the callback takes the message, or message and message info.
 
         :raises AttributeError: ``msg_type`` is no ROS interface.
         :raises InvalidTopicNameException: the topic name is invalid.
+        :raises InvalidQosOverridesError: the options' callback refuses what parameters ask for.
         """
-        profile = self._profile(qos_profile)
-        check_is_valid_msg_type(msg_type)
         full = self._full_name(topic)
-        dds_topic = full[1:] if profile.avoid_ros_namespace_conventions else "rt" + full
-        peers = self._peer_qos(dds_topic, readers=False, profile=profile)
-        name = msg_type._spec_.name
-        reader = self._context.participant.create_reader(
-            dds_topic, dds_type_name(name), registry.type_hash(name), profile.decide(peers, False)
-        )
-        group = callback_group or self._default_callback_group
-        callbacks = event_callbacks or SubscriptionEventCallbacks()
+        profile = self._profile(qos_profile, Subscription, full, qos_overriding_options)
+        reader = self._open(msg_type, full, profile, writer=False)
         subscription = Subscription(
-            reader, msg_type, topic, full, callback, group, profile, raw, callbacks, self._logger
+            reader,
+            msg_type,
+            topic,
+            full,
+            callback,
+            callback_group or self._default_callback_group,
+            profile,
+            raw,
+            event_callbacks=event_callbacks or SubscriptionEventCallbacks(),
+            logger_name=self._logger.name,
         )
-        group.add_entity(subscription)
-        self._subscriptions.append(subscription)
         self._waitables.extend(subscription.event_handlers)
-        self._announce(reader=reader)
-        self._wake_executor()
-        return subscription
+        return self._keep(subscription, self._subscriptions)
 
-    def _peer_qos(self, dds_topic: str, readers: bool, profile: QoSProfile) -> list[Any]:
-        """QoS of the other side, looked up only for profiles that depend on it."""
-        if "BEST_AVAILABLE" not in (profile.reliability.name, profile.durability.name):
-            return []
-        endpoints = self._context.graph.endpoints()
-        return [e.qos for e in endpoints if e.topic == dds_topic and e.is_reader == readers]
+    def _open(self, msg_type: Any, full_topic: str, profile: QoSProfile, writer: bool) -> Any:
+        """Make a writer or reader and announce it as this node's."""
+        check_is_valid_msg_type(msg_type)
+        raw = profile.avoid_ros_namespace_conventions
+        dds_topic = full_topic[1:] if raw else "rt" + full_topic
+        peers = []
+        if "BEST_AVAILABLE" in (profile.reliability.name, profile.durability.name):
+            endpoints = self._context.graph.endpoints()
+            peers = [e.qos for e in endpoints if e.topic == dds_topic and e.is_reader == writer]
+        participant = self._context.participant
+        create = participant.create_writer if writer else participant.create_reader
+        name = msg_type._spec_.name
+        endpoint: Any = create(
+            dds_topic, dds_type_name(name), registry.type_hash(name), profile.decide(peers, writer)
+        )
+        self._announce(**{"writer" if writer else "reader": endpoint})
+        return endpoint
 
     def create_client(
         self,
@@ -306,7 +327,7 @@ class EntityHolder:
             return False
         self._publishers.remove(publisher)
         self._drop_events(publisher)
-        self._announce(writer=publisher._writer, remove=True)
+        self._announce(writer=publisher._endpoint, remove=True)
         publisher.destroy()
         self._wake_executor()
         return True
@@ -317,7 +338,7 @@ class EntityHolder:
             return False
         self._subscriptions.remove(subscription)
         self._drop_events(subscription)
-        self._announce(reader=subscription._reader, remove=True)
+        self._announce(reader=subscription._endpoint, remove=True)
         subscription.destroy()
         self._wake_executor()
         return True

@@ -48,6 +48,9 @@ class GraphViewer:
     def resolve_topic_name(self, topic: str, *, only_expand: bool = False) -> str:
         raise NotImplementedError
 
+    def resolve_service_name(self, service: str, *, only_expand: bool = False) -> str:
+        raise NotImplementedError
+
     def _endpoints(self) -> list[Endpoint]:
         return self._context.graph.endpoints()
 
@@ -149,22 +152,37 @@ class GraphViewer:
     def _matching(self, topic: str, readers: bool) -> list[Endpoint]:
         return [e for e in self._endpoints() if e.is_reader == readers and e.topic == topic]
 
-    def _dds_topic(self, topic_name: str) -> str:
+    def _queried(self, name: str, service: bool = False, remap: bool = False) -> str:
+        resolve = self.resolve_service_name if service else self.resolve_topic_name
         try:
-            return "rt" + self.resolve_topic_name(topic_name)
+            return resolve(name, only_expand=not remap)
         except NameValidationException as error:
-            raise ValueError(f"topic name {topic_name!r} is invalid: {error}") from error
+            kind = "service" if service else "topic"
+            raise ValueError(f"{kind} name {name!r} is invalid: {error}") from error
 
     def count_publishers(self, topic_name: str) -> int:
-        """How many publishers a topic has."""
-        return len(self._matching(self._dds_topic(topic_name), False))
+        """How many publishers a topic has; its name is expanded but not remapped."""
+        return len(self._matching("rt" + self._queried(topic_name), False))
 
     def count_subscribers(self, topic_name: str) -> int:
-        """How many subscriptions a topic has."""
-        return len(self._matching(self._dds_topic(topic_name), True))
+        """How many subscriptions a topic has; its name is expanded but not remapped."""
+        return len(self._matching("rt" + self._queried(topic_name), True))
+
+    def _count_readers(self, service_name: str, kind: str) -> int:
+        full = self._queried(service_name, service=True)
+        pairs = [_service_pair(e, kind) for e in self._endpoints() if e.is_reader]
+        return sum(pair is not None and pair[0] == full for pair in pairs)
+
+    def count_clients(self, service_name: str) -> int:
+        """How many clients a service has; its name is expanded but not remapped."""
+        return self._count_readers(service_name, "reply")
+
+    def count_services(self, service_name: str) -> int:
+        """How many servers a service has; its name is expanded but not remapped."""
+        return self._count_readers(service_name, "request")
 
     def _infos(self, topic_name: str, no_mangle: bool, readers: bool) -> list[TopicEndpointInfo]:
-        topic = topic_name if no_mangle else self._dds_topic(topic_name)
+        topic = topic_name if no_mangle else "rt" + self._queried(topic_name, remap=True)
         graph = self._context.graph
         nodes = graph.nodes()
         return [self._info(e, graph.owner(e.guid, nodes)) for e in self._matching(topic, readers)]

@@ -8,13 +8,13 @@ from typing import Any
 from embedded_ros.interfaces.registry import registry
 from embedded_ros.transport import INFINITE, Writer
 
+from .destroyable import Destroyable
 from .duration import Duration
 from .event_handler import PublisherEventCallbacks
-from .exceptions import InvalidHandle
 from .qos import QoSProfile
 
 
-class Publisher:
+class Publisher(Destroyable):
     """Sends messages on a topic. Made by :meth:`rclpy.node.Node.create_publisher`."""
 
     def __init__(
@@ -26,27 +26,16 @@ class Publisher:
         qos_profile: QoSProfile,
         event_callbacks: PublisherEventCallbacks,
         callback_group: Any,
-        logger: Any = None,
+        logger_name: str,
     ) -> None:
-        self._writer: Writer | None = writer
+        self._endpoint = writer
         self._serialize = registry.serializer(msg_type)
         self._full_topic = full_topic
         self.msg_type = msg_type
         self.topic = topic
         self.qos_profile = qos_profile
-        self.event_handlers = event_callbacks.create_event_handlers(
-            callback_group, writer, full_topic, logger
-        )
-
-    @property
-    def handle(self) -> Writer:
-        """The writer.
-
-        :raises InvalidHandle: the publisher was destroyed.
-        """
-        if self._writer is None:
-            raise InvalidHandle("cannot use Destroyable because destruction was requested")
-        return self._writer
+        self.logger_name = logger_name
+        self.event_handlers = event_callbacks.create_event_handlers(callback_group, self, topic)
 
     def publish(self, msg: Any) -> None:
         """Send a message, or the bytes of an encoded one.
@@ -59,33 +48,31 @@ class Publisher:
             payload = msg
         else:
             raise TypeError(f"Expected {self.msg_type}, got {type(msg)}")
-        self.handle.write(payload)
+        self.handle._endpoint.write(payload)
 
     def get_subscription_count(self) -> int:
         """How many subscriptions are connected."""
-        return self.handle.matched()
+        return self.handle._endpoint.matched()
 
     @property
     def topic_name(self) -> str:
         """The full topic name."""
-        self.handle  # noqa: B018 - a destroyed publisher has no topic
-        return self._full_topic
+        return self.handle._full_topic
 
     def assert_liveliness(self) -> None:
         """Show subscribers that this publisher is alive (for MANUAL_BY_TOPIC liveliness)."""
-        self.handle.assert_liveliness()
+        self.handle._endpoint.assert_liveliness()
 
     def wait_for_all_acked(self, timeout: Duration | None = None) -> bool:
         """Wait until all reliable subscriptions have everything; False after ``timeout`` (default:
         none).
         """
         limit = INFINITE if timeout is None or timeout.nanoseconds < 0 else timeout.nanoseconds
-        return self.handle.wait_for_acked(min(limit, INFINITE // 2))
+        return self.handle._endpoint.wait_for_acked(min(limit, INFINITE // 2))
 
     def destroy(self) -> None:
         """Leave the topic; use :meth:`rclpy.node.Node.destroy_publisher`."""
         for handler in self.event_handlers:
             handler.destroy()
-        if self._writer is not None:
-            self._writer.close()
-            self._writer = None
+        super().destroy()
+        self._endpoint.close()

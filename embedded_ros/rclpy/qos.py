@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import warnings
 from enum import Enum, IntEnum
-from typing import Any
+from typing import Any, NamedTuple
 
 from embedded_ros.transport import INFINITE, Qos
 
@@ -227,6 +227,10 @@ class QoSProfile:
         policies = ", ".join(f"{slot[1:]}={getattr(self, slot)}" for slot in self.__slots__)
         return f"{type(self).__name__}({policies})"
 
+    def get_c_qos_profile(self) -> rmw_qos_profile_t:
+        """The policies as plain values; its ``to_dict()`` gives the arguments of this class."""
+        return rmw_qos_profile_t(*(getattr(self, slot) for slot in self.__slots__))
+
     def decide(self, peers: list[Qos] | None = None, writer: bool = True) -> Qos:
         """This profile with every policy decided, for the transport.
 
@@ -272,6 +276,30 @@ class QoSProfile:
             else LivelinessPolicy.AUTOMATIC,
             liveliness_lease_duration=_duration(qos.liveliness_lease),
         )
+
+
+class rmw_qos_profile_t(NamedTuple):
+    """All policies of a profile."""
+
+    history: HistoryPolicy
+    depth: int
+    reliability: ReliabilityPolicy
+    durability: DurabilityPolicy
+    lifespan: Duration
+    deadline: Duration
+    liveliness: LivelinessPolicy
+    liveliness_lease_duration: Duration
+    avoid_ros_namespace_conventions: bool
+
+    def to_dict(self) -> dict[str, Any]:
+        """The policies by name."""
+        return self._asdict()
+
+    @staticmethod
+    def predefined(name: str) -> rmw_qos_profile_t:
+        """The profile of that name in this module, such as ``qos_profile_sensor_data``."""
+        profile: QoSProfile = globals()[name]
+        return profile.get_c_qos_profile()
 
 
 def _nanoseconds(duration: Duration) -> int:

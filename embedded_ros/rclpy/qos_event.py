@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The former place of :mod:`rclpy.event_handler`."""
 
-from .event_handler import EventHandler, PublisherEventCallbacks, SubscriptionEventCallbacks
+import warnings
 
-QoSEventHandler = EventHandler
+from .event_handler import *  # noqa: F403
 
-__all__ = ["PublisherEventCallbacks", "QoSEventHandler", "SubscriptionEventCallbacks"]
+warnings.warn("importing 'qos_event' is deprecated; import 'event_handler' instead", stacklevel=2)

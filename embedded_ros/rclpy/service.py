@@ -50,7 +50,7 @@ class Service(ServiceEnd):
             sample = self._queue.popleft()
         except IndexError:
             return None, None
-        peers = self.handle._reader.peers()
+        peers = self.handle._endpoint.peers()
         if not user_data_value(peers.get(sample.writer, b""), "clientid"):
             # A client of another middleware puts its identity where it cannot be read from here,
             # or the client has gone: there is nobody to answer.
@@ -95,7 +95,7 @@ class Service(ServiceEnd):
         """Wait a little for the client's reader: it may be found after its writer."""
         end = time.monotonic() + _CLIENT_LIMIT
         while True:
-            client = self.handle._reader.peers().get(writer)
+            client = self.handle._endpoint.peers().get(writer)
             if client is None:
                 return False
             if user_data_value(client, "clientid") in self._peer_ids(

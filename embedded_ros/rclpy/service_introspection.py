@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from service_msgs.msg import ServiceEventInfo
 
+from embedded_ros.interfaces.registry import registry
+
 if TYPE_CHECKING:
     from .clock import Clock
     from .impl.service_ends import rmw_request_id_t
@@ -39,9 +41,10 @@ class Introspection:
         self._node = node
         self._clock = clock
         self._contents = contents
-        self._publisher = node.create_publisher(
-            event_type, service + "/_service_event", qos_profile
-        )
+        self._type = event_type
+        self._serialize = registry.serializer(event_type)
+        # Not among the node's publishers, as in ROS.
+        self._writer = node._open(event_type, service + "/_service_event", qos_profile, writer=True)
 
     def publish(self, event_type: int, request_id: rmw_request_id_t, message: Any) -> None:
         """Tell of a request or response."""
@@ -51,15 +54,16 @@ class Introspection:
             client_gid=list(struct.pack("<Q8x", request_id.writer_guid)),
             sequence_number=request_id.sequence_number,
         )
-        event = self._publisher.msg_type(info=info)
+        event = self._type(info=info)
         if self._contents:
             is_request = event_type in (
                 ServiceEventInfo.REQUEST_SENT,
                 ServiceEventInfo.REQUEST_RECEIVED,
             )
             setattr(event, "request" if is_request else "response", [message])
-        self._publisher.publish(event)
+        self._writer.write(self._serialize(event))
 
     def close(self) -> None:
         """Publish no more."""
-        self._node.destroy_publisher(self._publisher)
+        self._node._announce(writer=self._writer, remove=True)
+        self._writer.close()

@@ -9,7 +9,7 @@ from enum import Enum
 from typing import Any
 
 from embedded_ros.interfaces.registry import registry
-from embedded_ros.transport import Reader
+from embedded_ros.transport import Reader, Sample
 
 from .event_handler import SubscriptionEventCallbacks
 from .impl.queued import QueuedEntity, Work, await_or_execute
@@ -45,22 +45,20 @@ class Subscription(QueuedEntity):
         qos_profile: QoSProfile,
         raw: bool,
         event_callbacks: SubscriptionEventCallbacks,
-        logger: Any = None,
+        logger_name: str,
     ) -> None:
         keep_all = qos_profile.history == HistoryPolicy.KEEP_ALL
         super().__init__(reader, None if keep_all else max(qos_profile.depth, 1))
         self._deserialize = registry.deserializer(msg_type)
         self._full_topic = full_topic
-        self._logger = logger or get_logger("rclpy")
         self.msg_type = msg_type
         self.topic = topic
         self.callback = callback
         self.callback_group = callback_group
         self.qos_profile = qos_profile
         self.raw = raw
-        self.event_handlers = event_callbacks.create_event_handlers(
-            callback_group, reader, full_topic, logger
-        )
+        self.logger_name = logger_name
+        self.event_handlers = event_callbacks.create_event_handlers(callback_group, self, topic)
 
     @property
     def callback(self) -> Callable[..., Any]:
@@ -83,32 +81,35 @@ class Subscription(QueuedEntity):
     @property
     def topic_name(self) -> str:
         """The full topic name."""
-        self.handle  # noqa: B018 - a destroyed subscription has no topic
-        return self._full_topic
+        return self.handle._full_topic
 
     def get_publisher_count(self) -> int:
         """How many publishers are connected."""
-        return self.handle.matched()
+        return self.handle._endpoint.matched()
 
     def take(self) -> tuple[Any, dict[str, Any]] | None:
         """Take the oldest message and its info (timestamps in ns), or None when there is none."""
-        try:
-            sample = self._queue.popleft()
-        except IndexError:
-            return None
+        return self._take(self._queue.popleft(), self.raw) if self._queue else None
+
+    def take_message(self, msg_type: Any, raw: bool) -> tuple[Any, dict[str, Any]] | None:
+        """Take a message that no executor is to take, as :meth:`take`."""
+        self.drain()
+        return self._take(self._queue.popleft(), raw) if self._queue else None
+
+    def _take(self, sample: Sample, raw: bool) -> tuple[Any, dict[str, Any]] | None:
         info = {
             "source_timestamp": sample.source_timestamp,
             "received_timestamp": sample.received_timestamp,
             "publication_sequence_number": None,
             "reception_sequence_number": None,
         }
-        if self.raw:
+        if raw:
             return sample.payload, info
         try:
             return self._deserialize(sample.payload), info
         except Exception as error:
             # Whatever comes over the wire must not end the program.
-            self._logger.error(
+            get_logger(self.logger_name).error(
                 f"dropped a message on '{self._full_topic}' that cannot be read: {error}"
             )
             return None
@@ -127,4 +128,4 @@ class Subscription(QueuedEntity):
         """Leave the topic; use :meth:`rclpy.node.Node.destroy_subscription`."""
         for handler in self.event_handlers:
             handler.destroy()
-        self.close_reader()
+        super().destroy()

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import weakref
 from typing import TYPE_CHECKING, Any
 
 import rosgraph_msgs.msg
@@ -25,9 +26,9 @@ class TimeSource:
     """The link between a node's clocks and simulated time."""
 
     def __init__(self, *, node: Node | None = None) -> None:
-        self._node: Node | None = None
+        self._node: weakref.ref[Node] | None = None
         self._clocks: list[ROSClock] = []
-        self._subscription: Any = None
+        self._clock_sub: Any = None
         self._last: Time | None = None
         self._active = False
         if node is not None:
@@ -36,7 +37,7 @@ class TimeSource:
     def attach_node(self, node: Node) -> None:
         """Follow a node's parameter ``use_sim_time`` and listen to /clock through it."""
         self.detach_node()
-        self._node = node
+        self._node = weakref.ref(node)
         if not node.has_parameter(USE_SIM_TIME_NAME):
             node.declare_parameter(USE_SIM_TIME_NAME, False)
         if node.get_parameter(USE_SIM_TIME_NAME).type_ == Parameter.Type.BOOL:
@@ -48,14 +49,17 @@ class TimeSource:
             )
         node.add_on_set_parameters_callback(self._on_parameters)
 
+    def _get_node(self) -> Node | None:
+        return self._node() if self._node is not None else None
+
     def detach_node(self) -> None:
         """Leave the node; the time stands still where it was."""
-        node, self._node = self._node, None
+        node, self._node = self._get_node(), None
         if node is not None:
             node.remove_on_set_parameters_callback(self._on_parameters)
-            if self._subscription is not None:
-                node.destroy_subscription(self._subscription)
-                self._subscription = None
+            if self._clock_sub is not None:
+                node.destroy_subscription(self._clock_sub)
+                self._clock_sub = None
 
     @property
     def ros_time_is_active(self) -> bool:
@@ -69,23 +73,25 @@ class TimeSource:
         self._active = enabled
         for clock in self._clocks:
             self._apply(clock)
-        if self._node is None:
+        node = self._get_node()
+        if node is None:
             return
-        if enabled and self._subscription is None:
+        if enabled and self._clock_sub is None:
             qos = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-            self._subscription = self._node.create_subscription(
+            self._clock_sub = node.create_subscription(
                 rosgraph_msgs.msg.Clock, CLOCK_TOPIC, self._on_clock, qos
             )
-        elif not enabled and self._subscription is not None:
-            self._node.destroy_subscription(self._subscription)
-            self._subscription = None
+        elif not enabled and self._clock_sub is not None:
+            node.destroy_subscription(self._clock_sub)
+            self._clock_sub = None
 
     def _apply(self, clock: ROSClock) -> None:
         if self._active and self._last is not None:
             clock.set_ros_time_override(self._last)
         clock._set_ros_time_is_active(self._active)
-        if self._node is not None:
-            self._node._restart_timers(clock)
+        node = self._get_node()
+        if node is not None:
+            node._restart_timers(clock)
 
     def attach_clock(self, clock: ROSClock) -> None:
         """Feed a clock.
@@ -102,12 +108,12 @@ class TimeSource:
         self._clocks.remove(clock)
 
     def _on_clock(self, message: Any) -> None:
-        before = self._last
+        before, node = self._last, self._get_node()
         self._last = Time.from_msg(message.clock)
         for clock in self._clocks:
             clock.set_ros_time_override(self._last)
-            if self._node is not None and (before is None or self._last < before):
-                self._node._restart_timers(clock)
+            if node is not None and (before is None or self._last < before):
+                node._restart_timers(clock)
 
     def _on_parameters(self, parameters: list[Parameter]) -> Any:
         for parameter in parameters:

@@ -8,11 +8,12 @@ from collections.abc import Callable
 from typing import Any
 
 from .clock import Clock
-from .exceptions import InvalidHandle, ROSInterruptException
+from .destroyable import Destroyable
+from .exceptions import ROSInterruptException
 from .utilities import get_default_context
 
 
-class Timer:
+class Timer(Destroyable):
     """Calls back periodically. It keeps its phase and skips periods that were missed."""
 
     def __init__(
@@ -35,7 +36,6 @@ class Timer:
         self.callback = callback
         self.callback_group = callback_group
         self._executor_event = False
-        self._destroyed = False
         self._canceled = not autostart
         self._lock = threading.Lock()
         self._last_call = clock._now()
@@ -48,16 +48,6 @@ class Timer:
         if period < 0:
             raise ValueError(f"timer period must be non-negative, got {period} ns")
         return period
-
-    @property
-    def handle(self) -> Timer:
-        """The timer itself.
-
-        :raises InvalidHandle: it was destroyed.
-        """
-        if self._destroyed:
-            raise InvalidHandle("cannot use Destroyable because destruction was requested")
-        return self
 
     @property
     def clock(self) -> Clock:
@@ -123,10 +113,6 @@ class Timer:
             if self._next_call - now > self._period or self._last_call > now:
                 self._last_call = now
                 self._next_call = now + self._period
-
-    def destroy(self) -> None:
-        """Give up the timer; use :meth:`rclpy.node.Node.destroy_timer`."""
-        self._destroyed = True
 
 
 class Rate:

@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 
-@dataclass
+@dataclass(slots=True)
 class TypeHash:
     """Version and value (32 bytes) of a type hash; version -1: not known."""
 

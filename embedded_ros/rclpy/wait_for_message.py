@@ -34,7 +34,7 @@ def wait_for_message(
     end = None if time_to_wait < 0 else time.monotonic() + time_to_wait
     context.add_waker(waiter)
     try:
-        waiter.set_readers({subscription.handle})
+        waiter.set_readers({subscription._endpoint})
         while context.ok():
             left = None if end is None else end - time.monotonic()
             if left is not None and left <= 0:

@@ -34,6 +34,16 @@ class NumberOfEntities:
         self.num_services = num_services
         self.num_events = num_events
 
+    def __add__(self, other: NumberOfEntities) -> NumberOfEntities:
+        result = NumberOfEntities()
+        for name in self.__slots__:
+            setattr(result, name, getattr(self, name) + getattr(other, name))
+        return result
+
+    def __repr__(self) -> str:
+        counts = ", ".join(f"{name}={getattr(self, name)}" for name in self.__slots__)
+        return f"<{type(self).__name__}({counts})>"
+
 
 class Waitable:
     """Base of what :meth:`Node.add_waitable` takes.

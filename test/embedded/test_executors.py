@@ -256,3 +256,31 @@ def test_rate_sleeps_while_another_thread_spins(node, context):
     node.destroy_rate(rate)
     executor.shutdown()
     thread.join()
+
+
+def test_shutdown_does_not_wait_for_coroutines_that_gave_way(node, context):
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+    never, started = Future(), []
+
+    async def wait():
+        started.append(True)
+        timer.cancel()
+        await never
+
+    timer = node.create_timer(0.0, wait)
+    while not started:
+        executor.spin_once(timeout_sec=0.1)
+    assert executor.shutdown(timeout_sec=5.0)
+
+
+def test_a_callback_may_shut_its_executor_down(node, context):
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+    ended = []
+    node.create_timer(0.0, lambda: ended.append(executor.shutdown()))
+    thread = threading.Thread(target=executor.spin, daemon=True)
+    thread.start()
+    thread.join(10)
+    assert not thread.is_alive()
+    assert ended == [True]

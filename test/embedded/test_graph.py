@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """What nodes see of the graph, names, and tf broadcasters."""
 
+import time
+
 import pytest
 from geometry_msgs.msg import PoseArray, TransformStamped
 from rclpy.exceptions import (
+    InvalidHandle,
     InvalidNamespaceException,
     InvalidNodeNameException,
     NoTypeSupportImportedException,
@@ -19,6 +22,7 @@ from rclpy.qos import (
     qos_profile_sensor_data,
 )
 from std_msgs.msg import String
+from std_srvs.srv import Trigger
 from tf2_msgs.msg import TFMessage
 from tf2_ros import StaticTransformBroadcaster, TransformBroadcaster
 
@@ -106,6 +110,66 @@ def test_qos_profiles():
         QoSProfile(history=HistoryPolicy.KEEP_LAST)
     with pytest.warns(UserWarning, match="zero depth"):
         QoSProfile(depth=0)
+
+
+def test_services_are_counted(node, spin):
+    node.create_client(Trigger, "ask")
+    node.create_service(Trigger, "ask", lambda request, response: response)
+    node.create_service(Trigger, "/ask", lambda request, response: response)
+    assert spin(lambda: node.count_services("ask") == 2 and node.count_clients("/ask") == 1, node)
+    assert node.count_services("nobody") == 0
+    for count in (node.count_services, node.count_clients):
+        with pytest.raises(ValueError, match="is invalid"):
+            count("42")
+        with pytest.raises(TypeError):
+            count(42)
+
+
+def test_counting_does_not_remap_but_infos_do(make_node, spin):
+    node = make_node(cli_args=["--ros-args", "-r", "from:=to"])
+    node.create_publisher(String, "from", 1)
+    assert spin(lambda: node.count_publishers("/to") == 1, node)
+    assert node.count_publishers("from") == 0
+    assert len(node.get_publishers_info_by_topic("from")) == 1
+
+
+def test_only_what_was_created_is_listed(node):
+    assert [publisher.topic_name for publisher in node.publishers] == ["/parameter_events"]
+
+
+def test_handles_are_context_managers_until_destroyed(node):
+    publisher = node.create_publisher(String, "text", 1)
+    subscription = node.create_subscription(String, "text", print, 1)
+    timer = node.create_timer(10.0, print)
+    service = node.create_service(Trigger, "ask", lambda request, response: response)
+    client = node.create_client(Trigger, "ask")
+    made = (publisher, subscription, timer, service, client)
+    for entity in made:
+        with entity.handle:
+            pass
+    node.destroy_publisher(publisher)
+    node.destroy_subscription(subscription)
+    node.destroy_timer(timer)
+    node.destroy_service(service)
+    node.destroy_client(client)
+    node.destroy_node()
+    for entity in (*made, node):
+        with pytest.raises(InvalidHandle), entity.handle:
+            pass
+
+
+def test_messages_can_be_taken_without_spinning(node):
+    subscription = node.create_subscription(String, "text", print, 1)
+    publisher = node.create_publisher(String, "text", 1)
+    publisher.publish(String(data="x"))
+    taken = None
+    end = time.monotonic() + 15
+    while taken is None and time.monotonic() < end:
+        with subscription.handle:
+            taken = subscription.handle.take_message(subscription.msg_type, False)
+    message, info = taken
+    assert message == String(data="x")
+    assert info["source_timestamp"] > 0
 
 
 def test_transform_broadcasters(node, spin):

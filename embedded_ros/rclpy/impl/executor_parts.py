@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from embedded_ros.transport import Reader, Waiter
@@ -42,26 +43,30 @@ class TimeoutObject:
 
 
 class WorkTracker:
-    """Counts what is being executed."""
+    """Knows which threads execute something; a coroutine that gave way is not executed."""
 
     def __init__(self) -> None:
-        self._running = 0
+        self._threads: list[int] = []
         self._condition = threading.Condition()
 
-    def __enter__(self) -> None:
+    def run(self, task: Callable[[], None]) -> None:
+        """Run a task or a step of it."""
         with self._condition:
-            self._running += 1
-
-    def __exit__(self, *args: object) -> None:
-        with self._condition:
-            self._running -= 1
-            self._condition.notify_all()
+            self._threads.append(threading.get_ident())
+        try:
+            task()
+        finally:
+            with self._condition:
+                self._threads.remove(threading.get_ident())
+                self._condition.notify_all()
 
     def wait(self, timeout_sec: float | None = None) -> bool:
+        """Wait until no thread but the calling one executes anything; False after the timeout."""
+        me = threading.get_ident()
         if timeout_sec is not None and timeout_sec < 0.0:
             timeout_sec = None
         with self._condition:
-            return self._condition.wait_for(lambda: self._running == 0, timeout_sec)
+            return self._condition.wait_for(lambda: set(self._threads) <= {me}, timeout_sec)
 
 
 class Entities:

@@ -12,13 +12,13 @@ from typing import Any
 
 from embedded_ros.transport import Reader, Sample
 
-from ..exceptions import InvalidHandle
+from ..destroyable import Destroyable
 
 #: what an executor runs: a coroutine function without arguments
 Work = Callable[[], Any]
 
 
-class QueuedEntity:
+class QueuedEntity(Destroyable):
     """Moves samples from the middleware into a queue of its own as soon as they arrive.
 
     The executor drains all readers after every wake and runs :meth:`take_work` when the callback
@@ -29,32 +29,18 @@ class QueuedEntity:
     callback_group: Any
 
     def __init__(self, reader: Reader, depth: int | None) -> None:
-        self._reader: Reader | None = reader
+        self._endpoint = reader
         self._queue: deque[Sample] = deque(maxlen=depth)
         self._executor_event = False
 
     @property
-    def handle(self) -> Reader:
-        """The reader.
-
-        :raises InvalidHandle: the entity was destroyed.
-        """
-        if self._reader is None:
-            raise InvalidHandle("cannot use Destroyable because destruction was requested")
-        return self._reader
-
-    @property
     def reader(self) -> Reader | None:
         """The reader, None once destroyed."""
-        return self._reader
+        return None if self._destroyed else self._endpoint
 
     def drain(self) -> None:
         """Fetch what has arrived."""
-        reader = self._reader
-        if reader is not None:
-            samples = reader.take(256)
-            if samples:
-                self._queue.extend(samples)
+        self._queue.extend(self._endpoint.take(256))
 
     def has_work(self) -> bool:
         """Whether something waits to be taken."""
@@ -66,11 +52,10 @@ class QueuedEntity:
         """
         raise NotImplementedError
 
-    def close_reader(self) -> None:
+    def destroy(self) -> None:
         """Leave the topic and drop what was queued."""
-        if self._reader is not None:
-            self._reader.close()
-            self._reader = None
+        super().destroy()
+        self._endpoint.close()
         self._queue.clear()
 
 

@@ -28,7 +28,10 @@ class Rosout:
     def __init__(self, node: Node) -> None:
         self._message: Any = registry.message_class("rcl_interfaces/msg/Log")
         self._stamp: Any = registry.message_class("builtin_interfaces/msg/Time")
-        self._publisher = node.create_publisher(self._message, "/rosout", _QOS)
+        self._node = node
+        self._serialize = registry.serializer(self._message)
+        # Not among the node's publishers, as in ROS.
+        self._writer = node._open(self._message, "/rosout", _QOS, writer=True)
         self._busy = threading.local()
         sinks = rcutils_logger.sinks.setdefault(node.get_logger().name, [])
         # Nodes of one name share the list; each publishes, as in ROS.
@@ -42,17 +45,16 @@ class Rosout:
         self._busy.inside = True
         try:
             seconds, nanoseconds = divmod(stamp, 10**9)
-            self._publisher.publish(
-                self._message(
-                    stamp=self._stamp(sec=seconds, nanosec=nanoseconds),
-                    level=int(severity),
-                    name=name,
-                    msg=message,
-                    file=caller.file_path,
-                    function=caller.function_name,
-                    line=caller.line_number,
-                )
+            log = self._message(
+                stamp=self._stamp(sec=seconds, nanosec=nanoseconds),
+                level=int(severity),
+                name=name,
+                msg=message,
+                file=caller.file_path,
+                function=caller.function_name,
+                line=caller.line_number,
             )
+            self._writer.write(self._serialize(log))
         except Exception:
             # Logging goes on at the console while the middleware goes down.
             pass
@@ -66,3 +68,5 @@ class Rosout:
                 sinks.remove(self._publish)
             if not sinks:
                 del rcutils_logger.sinks[name]
+        self._node._announce(writer=self._writer, remove=True)
+        self._writer.close()

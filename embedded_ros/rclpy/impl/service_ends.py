@@ -17,7 +17,6 @@ from embedded_ros.interfaces.registry import registry
 from embedded_ros.transport import Sample
 from embedded_ros.transport.graph import dds_type_name, user_data_value
 
-from ..exceptions import InvalidHandle
 from ..qos import HistoryPolicy, QoSProfile
 from ..service_introspection import Introspection, ServiceIntrospectionState
 from .queued import QueuedEntity
@@ -95,22 +94,6 @@ class ServiceEnd(QueuedEntity):
         return topic, dds_type_name(name), registry.type_hash(name), qos, self._id
 
     @property
-    def handle(self) -> Any:
-        """This object.
-
-        :raises InvalidHandle: it was destroyed.
-        """
-        if self._reader is None:
-            raise InvalidHandle("cannot use Destroyable because destruction was requested")
-        return self
-
-    def __enter__(self) -> Any:
-        return self.handle
-
-    def __exit__(self, *args: object) -> None:
-        pass
-
-    @property
     def service_name(self) -> str:
         """The full service name."""
         return self.handle._full_name
@@ -164,11 +147,11 @@ class ServiceEnd(QueuedEntity):
 
     def destroy(self) -> None:
         """Leave the service; use the node's method for it."""
-        if self._reader is None:
+        if self._destroyed:
             return
         if self._introspection is not None:
             self._introspection.close()
             self._introspection = None
-        self._node._announce(writer=self._writer, reader=self._reader, remove=True)
+        self._node._announce(writer=self._writer, reader=self._endpoint, remove=True)
         self._writer.close()
-        self.close_reader()
+        super().destroy()

@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: Apache-2.0
+"""QoS profiles as values and as set by parameters, and the events of peers."""
+
+import pytest
+from rclpy.duration import Duration
+from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
+from rclpy.parameter import Parameter
+from rclpy.qos import (
+    DurabilityPolicy,
+    HistoryPolicy,
+    LivelinessPolicy,
+    QoSPolicyKind,
+    QoSPresetProfiles,
+    QoSProfile,
+    ReliabilityPolicy,
+    qos_profile_sensor_data,
+)
+from rclpy.qos_overriding_options import (
+    InvalidQosOverridesError,
+    QosCallbackResult,
+    QoSOverridingOptions,
+)
+from std_msgs.msg import Float64, String
+
+
+@pytest.mark.parametrize(
+    "profile",
+    [
+        QoSProfile(depth=7),
+        QoSProfile(
+            history=HistoryPolicy.KEEP_ALL,
+            depth=2,
+            reliability=ReliabilityPolicy.BEST_EFFORT,
+            durability=DurabilityPolicy.TRANSIENT_LOCAL,
+            lifespan=Duration(seconds=5),
+            deadline=Duration(nanoseconds=1),
+            liveliness=LivelinessPolicy.MANUAL_BY_TOPIC,
+            liveliness_lease_duration=Duration(seconds=1),
+            avoid_ros_namespace_conventions=True,
+        ),
+        *(preset.value for preset in QoSPresetProfiles),
+    ],
+)
+def test_profiles_survive_a_dictionary(profile):
+    policies = profile.get_c_qos_profile().to_dict()
+    assert set(policies) == {slot[1:] for slot in QoSProfile.__slots__}
+    assert QoSProfile(**policies) == profile
+
+
+def test_parameters_override_what_the_options_name(make_node):
+    overrides = {"depth": 4, "reliability": "best_effort", "durability": "transient_local"}
+    node = make_node(
+        parameter_overrides=[
+            Parameter(f"qos_overrides./text.publisher.{name}", value=value)
+            for name, value in overrides.items()
+        ]
+    )
+    publisher = node.create_publisher(
+        String, "text", 10, qos_overriding_options=QoSOverridingOptions.with_default_policies()
+    )
+    assert publisher.qos_profile == QoSProfile(depth=4, reliability=ReliabilityPolicy.BEST_EFFORT)
+    declared = node.get_parameters_by_prefix("qos_overrides./text.publisher")
+    assert {name: parameter.value for name, parameter in declared.items()} == {
+        "history": "keep_last",
+        "depth": 4,
+        "reliability": "best_effort",
+    }
+    [result] = node.set_parameters([Parameter("qos_overrides./text.publisher.depth", value=5)])
+    assert not result.successful
+
+
+def test_overrides_of_a_subscription_with_an_id(make_node):
+    prefix = "qos_overrides./text.subscription_second"
+    node = make_node(parameter_overrides=[Parameter(f"{prefix}.deadline", value=5_000_000_000)])
+    kinds = [QoSPolicyKind.DEADLINE, QoSPolicyKind.LIFESPAN]
+    subscription = node.create_subscription(
+        String,
+        "text",
+        print,
+        QoSProfile(depth=1),
+        qos_overriding_options=QoSOverridingOptions(kinds, entity_id="second"),
+    )
+    assert subscription.qos_profile.deadline == Duration(seconds=5)
+    assert not node.has_parameter(f"{prefix}.lifespan")  # a subscription has none
+
+
+def test_bad_overrides_are_refused(make_node):
+    options = QoSOverridingOptions.with_default_policies()
+    name = "qos_overrides./text.publisher.reliability"
+    node = make_node(parameter_overrides=[Parameter(name, value="sometimes")])
+    with pytest.raises(RuntimeError, match="sometimes"):
+        node.create_publisher(String, "text", 10, qos_overriding_options=options)
+    options = QoSOverridingOptions.with_default_policies(
+        callback=lambda qos: QosCallbackResult(successful=qos.depth > 10, reason="too shallow")
+    )
+    with pytest.raises(InvalidQosOverridesError, match="too shallow"):
+        node.create_publisher(String, "other", 10, qos_overriding_options=options)
+
+
+def test_matched_events_count_peers(node, spin):
+    joined, heard = [], []
+    publisher = node.create_publisher(
+        String, "text", 1, event_callbacks=PublisherEventCallbacks(matched=joined.append)
+    )
+    subscription = node.create_subscription(
+        String, "text", print, 1, event_callbacks=SubscriptionEventCallbacks(matched=heard.append)
+    )
+    assert spin(lambda: joined and heard, node)
+    for info in (joined[-1], heard[-1]):
+        assert (info.total_count, info.total_count_change) == (1, 1)
+        assert (info.current_count, info.current_count_change) == (1, 1)
+    node.destroy_subscription(subscription)
+    assert spin(lambda: len(joined) == 2, node)
+    assert (joined[-1].total_count, joined[-1].total_count_change) == (1, 0)
+    assert (joined[-1].current_count, joined[-1].current_count_change) == (0, -1)
+    assert publisher.get_subscription_count() == 0
+
+
+def test_refused_peers_are_told_of(node, spin):
+    refusals, refused = [], []
+    node.create_publisher(
+        String,
+        "text",
+        qos_profile_sensor_data,
+        event_callbacks=PublisherEventCallbacks(incompatible_qos=refusals.append),
+    )
+    node.create_subscription(
+        String,
+        "text",
+        print,
+        1,
+        event_callbacks=SubscriptionEventCallbacks(incompatible_qos=refused.append),
+    )
+    assert spin(lambda: refusals and refused, node)
+    for info in (refusals[0], refused[0]):
+        assert (info.total_count, info.total_count_change) == (1, 1)
+        assert info.last_policy_kind == QoSPolicyKind.RELIABILITY
+
+
+def test_liveliness_and_deadline_events(node, spin):
+    alive, missed = [], []
+    callbacks = SubscriptionEventCallbacks(liveliness=alive.append, deadline=missed.append)
+    profile = QoSProfile(depth=1, deadline=Duration(seconds=0.2))
+    node.create_subscription(Float64, "rate", print, profile, event_callbacks=callbacks)
+    publisher = node.create_publisher(Float64, "rate", profile)
+    assert spin(lambda: alive, node)
+    assert (alive[0].alive_count, alive[0].alive_count_change) == (1, 1)
+    assert (alive[0].not_alive_count, alive[0].not_alive_count_change) == (0, 0)
+    publisher.publish(Float64())
+    assert spin(lambda: missed, node)
+    assert missed[0].total_count == missed[0].total_count_change > 0
+    node.destroy_publisher(publisher)
+    assert spin(lambda: alive[-1].alive_count == 0, node)
+
+
+def test_default_callbacks_can_be_left_out(node):
+    for use, expected in ((True, 2), (False, 0)):
+        callbacks = PublisherEventCallbacks(use_default_callbacks=use)
+        publisher = node.create_publisher(String, "text", 1, event_callbacks=callbacks)
+        assert len(publisher.event_handlers) == expected
