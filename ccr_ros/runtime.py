@@ -37,7 +37,8 @@ def enable_ros() -> bool:
 
     Raises:
         RuntimeMissing: ROS 2 is sourced but ``ccr_msgs`` is not; or there is no ROS 2 and the
-            embedded runtime's dependencies are not installed.
+            embedded runtime's dependencies are not installed, or EMBEDDED_ROS_TRANSPORT asks for
+            what is not there.
     """
     if real_ros():
         if PathFinder.find_spec("ccr_msgs") is None:
@@ -50,6 +51,6 @@ def enable_ros() -> bool:
 
     try:
         embedded_ros.enable(interface_paths=[msg_defs_dir()])
-    except embedded_ros.MissingDependencyError as error:
+    except (embedded_ros.MissingDependencyError, ValueError) as error:
         raise RuntimeMissing(str(error)) from error
     return True

@@ -3,7 +3,7 @@
 
 :func:`enable` makes ``import rclpy``, ``import std_msgs.msg`` and so on work when no real rclpy is
 installed. What goes over the wire is what ROS 2 Jazzy sends, so nodes on both kinds of machine see
-each other.
+each other. Without cyclonedds, nodes of one process do.
 """
 
 from __future__ import annotations
@@ -13,10 +13,11 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from .transport import transport
+
 __all__ = ["MissingDependencyError", "enable", "interface_folders"]
 
 _REQUIRED = {
-    "cyclonedds": "cyclonedds>=11.0.1,<11.1",
     "rosbags": "rosbags",
     "numpy": "numpy",
     "yaml": "pyyaml",
@@ -72,6 +73,7 @@ def enable(interface_paths: Sequence[Path | str] = ()) -> bool:
         done. Calling again is harmless and adds further interface paths.
     :raises MissingDependencyError: a needed package is not installed.
     :raises FileNotFoundError: an interface path is no folder.
+    :raises ValueError: EMBEDDED_ROS_TRANSPORT names no transport that is there.
     """
     finder = next((f for f in sys.meta_path if _is_ours(f)), None)
     if finder is None:
@@ -87,6 +89,7 @@ def enable(interface_paths: Sequence[Path | str] = ()) -> bool:
                 "installed; "
                 f"run: {sys.executable} -m pip install {wanted}"
             )
+        transport()
         from .finder import InterfaceFinder
         from .interfaces.registry import registry
 

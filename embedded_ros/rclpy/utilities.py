@@ -8,6 +8,8 @@ import threading
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from embedded_ros.transport import TRANSPORTS, available_transports, transport
+
 from .constants import S_TO_NS
 
 if TYPE_CHECKING:
@@ -67,13 +69,15 @@ def try_shutdown(*, context: Context | None = None) -> None:
 
 
 def get_rmw_implementation_identifier() -> str:
-    """The middleware spoken: the same on the wire as rmw_cyclonedds_cpp."""
-    return "rmw_cyclonedds_cpp"
+    """The middleware spoken: the same on the wire as rmw_cyclonedds_cpp, or that within this
+    process only.
+    """
+    return TRANSPORTS[transport()]
 
 
 def get_available_rmw_implementations() -> set[str]:
     """All middlewares there are."""
-    return {"rmw_cyclonedds_cpp"}
+    return {TRANSPORTS[name] for name in available_transports()}
 
 
 def timeout_sec_to_nsec(timeout_sec: float | None) -> int:

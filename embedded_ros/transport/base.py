@@ -61,6 +61,11 @@ class Endpoint:
     user_data: bytes
 
 
+def user_data(type_hash: str, extra: str) -> bytes:
+    """What an endpoint announces, as ROS 2 does."""
+    return (extra + (f"typehash={type_hash};" if type_hash else "")).encode()
+
+
 class Writer(ABC):
     """Sends payloads on one topic."""
 

@@ -41,7 +41,17 @@ from cyclonedds.topic import Topic
 
 from embedded_ros.interrupts import uninterrupted
 
-from .base import Endpoint, Participant, Qos, Reader, Sample, StatusChange, Waiter, Writer
+from .base import (
+    Endpoint,
+    Participant,
+    Qos,
+    Reader,
+    Sample,
+    StatusChange,
+    Waiter,
+    Writer,
+    user_data,
+)
 from .cyclone_config import domain_xml
 from .cyclone_types import carrier, from_cyclone, to_cyclone
 
@@ -339,22 +349,18 @@ class CycloneParticipant(Participant):
             self._topics[key] = Topic(self.participant, name, carrier(type_name, type_hash))
         return self._topics[key]
 
-    @staticmethod
-    def _user_data(type_hash: str, extra: str) -> bytes:
-        return (extra + (f"typehash={type_hash};" if type_hash else "")).encode()
-
     def create_writer(
         self, topic: str, type_name: str, type_hash: str, qos: Qos, extra_user_data: str = ""
     ) -> Writer:
         with _lock:
-            policies = to_cyclone(qos, self._user_data(type_hash, extra_user_data), True)
+            policies = to_cyclone(qos, user_data(type_hash, extra_user_data), True)
             return CycloneWriter(self, self._topic(topic, type_name, type_hash), policies)
 
     def create_reader(
         self, topic: str, type_name: str, type_hash: str, qos: Qos, extra_user_data: str = ""
     ) -> Reader:
         with _lock:
-            policies = to_cyclone(qos, self._user_data(type_hash, extra_user_data), False)
+            policies = to_cyclone(qos, user_data(type_hash, extra_user_data), False)
             return CycloneReader(self, self._topic(topic, type_name, type_hash), policies)
 
     def create_waiter(self) -> Waiter:
@@ -383,7 +389,7 @@ class CycloneParticipant(Participant):
         if not info.valid_data or info.instance_state != InstanceState.Alive:
             self._endpoints.pop(key, None)
             return
-        qos, user_data = from_cyclone(sample.qos)
+        qos, announced = from_cyclone(sample.qos)
         self._endpoints[key] = Endpoint(
             guid=sample.key.bytes,
             participant=sample.participant_key.bytes,
@@ -391,7 +397,7 @@ class CycloneParticipant(Participant):
             type_name=sample.type_name,
             is_reader=is_reader,
             qos=qos,
-            user_data=user_data,
+            user_data=announced,
         )
 
     def close(self) -> None:

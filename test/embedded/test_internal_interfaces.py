@@ -151,7 +151,7 @@ def test_missing_dependencies_are_named():
         f"import sys; sys.path.insert(0, {str(ROOT)!r})\n"
         "import importlib.util as util\n"
         "find = util.find_spec\n"
-        "util.find_spec = lambda name, *rest: None if name == 'cyclonedds' else find(name, *rest)\n"
+        "util.find_spec = lambda name, *rest: None if name == 'rosbags' else find(name, *rest)\n"
         "import embedded_ros\n"
         "try:\n    embedded_ros.enable()\n"
         "except embedded_ros.MissingDependencyError as error:\n    print(error)\n"
@@ -159,8 +159,8 @@ def test_missing_dependencies_are_named():
     done = subprocess.run(
         [sys.executable, "-c", program], check=True, capture_output=True, text=True
     )
-    assert "pip install 'cyclonedds" in done.stdout
-    assert "rosbags" not in done.stdout
+    assert "pip install 'rosbags" in done.stdout
+    assert "numpy" not in done.stdout
 
 
 @pytest.mark.parametrize(
