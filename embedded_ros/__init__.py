@@ -13,7 +13,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from .transport import transport
+from .transport import chosen_transport
 
 __all__ = ["MissingDependencyError", "enable", "interface_folders"]
 
@@ -89,7 +89,7 @@ def enable(interface_paths: Sequence[Path | str] = ()) -> bool:
                 "installed; "
                 f"run: {sys.executable} -m pip install {wanted}"
             )
-        transport()
+        chosen_transport()
         from .finder import InterfaceFinder
         from .interfaces.registry import registry
 

@@ -8,7 +8,7 @@ import threading
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from embedded_ros.transport import TRANSPORTS, available_transports, transport
+from embedded_ros.transport import TRANSPORTS, available_transports, chosen_transport
 
 from .constants import S_TO_NS
 
@@ -72,7 +72,7 @@ def get_rmw_implementation_identifier() -> str:
     """The middleware spoken: the same on the wire as rmw_cyclonedds_cpp, or that within this
     process only.
     """
-    return TRANSPORTS[transport()]
+    return TRANSPORTS[chosen_transport()]
 
 
 def get_available_rmw_implementations() -> set[str]:

@@ -28,8 +28,8 @@ __all__ = [
     "Waiter",
     "Writer",
     "available_transports",
+    "chosen_transport",
     "open_participant",
-    "transport",
 ]
 
 VARIABLE = "EMBEDDED_ROS_TRANSPORT"
@@ -50,7 +50,7 @@ def available_transports() -> list[str]:
     return ["cyclone", "local"] if found else ["local"]
 
 
-def transport() -> str:
+def chosen_transport() -> str:
     """The transport in use, ``cyclone`` or ``local``.
 
     :raises ValueError: EMBEDDED_ROS_TRANSPORT is neither of them, or asks for what is not there.
@@ -69,9 +69,9 @@ def transport() -> str:
 def open_participant(domain_id: int) -> Participant:
     """Join a domain.
 
-    :raises ValueError: as for :func:`transport`.
+    :raises ValueError: as for :func:`chosen_transport`.
     """
-    if transport() == "local":
+    if chosen_transport() == "local":
         from .local import LocalParticipant
 
         _say_what_is_missing()

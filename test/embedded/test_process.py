@@ -31,6 +31,7 @@ def test_an_unknown_ros_argument_ends_the_process_with_a_message(program):
     assert "--bogus" in err
 
 
+@pytest.mark.processes
 @pytest.mark.parametrize(
     "setting", [{"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}, {"ROS_LOCALHOST_ONLY": "1"}]
 )
@@ -41,6 +42,7 @@ def test_loopback_settings_reach_each_other(node, spin, program, setting):
     assert spin(lambda: got, node)
 
 
+@pytest.mark.processes
 def test_discovery_switched_off_isolates_a_process(node, spin, program):
     hidden = program("talker.py", ROS_AUTOMATIC_DISCOVERY_RANGE="OFF")
     hidden.wait_for_line("ready")

@@ -208,6 +208,7 @@ def test_wait_for_message(node):
     assert wait_for_message(String, node, "never", time_to_wait=0.05) == (False, None)
 
 
+@pytest.mark.processes
 def test_two_processes_talk_and_latched_data_waits(node, spin, program):
     talker = program("talker.py")
     talker.wait_for_line("ready")
@@ -223,6 +224,7 @@ def test_two_processes_talk_and_latched_data_waits(node, spin, program):
     assert spin(lambda: node.count_publishers("chatter") == 0, node)
 
 
+@pytest.mark.processes
 def test_remapping_on_the_command_line_of_another_process(node, spin, program):
     remaps = ["-r", "__ns:=/left", "-r", "__node:=speaker", "-r", "chatter:=words"]
     talker = program("talker.py", "--ros-args", *remaps)

@@ -173,6 +173,7 @@ def test_introspection_publishes_what_passes(pair, spin):
     assert not by_kind[ServiceEventInfo.REQUEST_RECEIVED].response
 
 
+@pytest.mark.processes
 def test_services_across_processes(program, node, spin):
     server = program("flipper.py")
     server.wait_for_line("ready")

@@ -54,6 +54,7 @@ def end(process, how):
     return process.returncode
 
 
+@pytest.mark.processes
 def test_two_processes_and_a_probe(probe, launch, small_gripper):
     left = launch("-r", "__ns:=/left", "-p", f"gripper_file:={small_gripper}")
     right = launch("-r", "__ns:=/right", "-p", f"gripper_file:={small_gripper}")
@@ -66,6 +67,7 @@ def test_two_processes_and_a_probe(probe, launch, small_gripper):
     assert end(right, signal.SIGTERM) == 0
 
 
+@pytest.mark.processes
 def test_who_comes_late_sees_all_at_once(probe, launch):
     process = launch("-r", "__ns:=/gripper")
     probe.pull_and_wait("finger_2", [0.003])
@@ -121,6 +123,7 @@ def test_what_cannot_start_says_why_in_one_line(arguments, text):
     assert done.returncode == 1
     assert "Traceback" not in done.stderr
     *before, line = done.stderr.strip().splitlines()
-    assert all("[rcl]" in one for one in before)  # real ROS logs of its own
+    # Real ROS logs of its own, and the transport within one process says what it is.
+    assert all("[rcl]" in one or "embedded_ros: " in one for one in before)
     assert line.startswith("solver_node: error: ")
     assert text in line
