@@ -249,7 +249,7 @@ class CycloneReader(Reader):
             )
         if kind == "liveliness":
             status = self._reader.get_liveliness_changed_status()
-            change = status.alive_count_change + status.not_alive_count_change
+            change = abs(status.alive_count_change) + abs(status.not_alive_count_change)
             return StatusChange(status.alive_count, change, status.not_alive_count)
         if kind == "deadline":
             status = self._reader.get_requested_deadline_missed_status()
