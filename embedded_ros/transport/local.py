@@ -298,11 +298,12 @@ class LocalWaiter(Waiter):
                 port.gates += (self._gate,)
             self._readers, self._ports = set(readers), ports
 
-    def wait(self, timeout: int | None) -> None:
+    def wait(self, timeout: int | None) -> list[Reader]:
         woken = self._gate.acquire(blocking=False)
         if not woken and not any(port.samples for port in self._ports):
             slice_ = _SLICE if timeout is None else min(max(timeout * 1e-9, 0), _SLICE)
             self._gate.acquire(timeout=slice_)
+        return [r for r in self._readers if isinstance(r, LocalReader) and r._port.samples]
 
     def wake(self) -> None:
         _open(self._gate)
