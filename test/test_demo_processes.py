@@ -8,7 +8,8 @@ import time
 import pytest
 
 from ccr_ros.demo.environment import import_environment
-from ccr_ros.demo.processes import Children, DemoFailed, SignalGuard
+from ccr_ros.demo.parts import DemoFailed, Part
+from ccr_ros.demo.processes import Children, SignalGuard
 
 
 @pytest.fixture
@@ -47,7 +48,7 @@ def test_children_end_with_the_block_even_if_they_refuse(module, tmp_path, monke
         "time.sleep(60)\n"
     )
     with pytest.raises(RuntimeError, match="left"), Children(tmp_path, env) as children:
-        child = children.start("stubborn", stubborn)
+        child = children.start(Part("stubborn", (stubborn,), ""))
         wait_for_output(child, "ready")
         raise RuntimeError("left")
     assert gone(child.pid) and child.exit_code == -signal.SIGKILL
@@ -56,9 +57,8 @@ def test_children_end_with_the_block_even_if_they_refuse(module, tmp_path, monke
 def test_an_ended_child_tells_how_and_what_it_said(module, tmp_path):
     write, env = module
     with Children(tmp_path, env) as children:
-        child = children.start(
-            "talker", write("print('early'); print(); raise SystemExit('too bad')")
-        )
+        program = write("print('early'); print(); raise SystemExit('too bad')")
+        child = children.start(Part("talker", (program,), ""))
         child.wait(time.monotonic() + 20)
         error = child.ended()
     assert isinstance(error, DemoFailed)
@@ -71,7 +71,7 @@ def test_an_ended_child_tells_how_and_what_it_said(module, tmp_path):
 def test_a_killed_child_tells_by_which_signal(module, tmp_path):
     write, env = module
     with Children(tmp_path, env) as children:
-        child = children.start("sleeper", write("import time; time.sleep(60)"))
+        child = children.start(Part("sleeper", (write("import time; time.sleep(60)"),), ""))
         os.kill(child.pid, signal.SIGKILL)
         child.wait(time.monotonic() + 20)
         assert "killed by SIGKILL" in str(child.ended())
@@ -84,9 +84,10 @@ def test_children_end_if_their_parent_is_killed(module, tmp_path):
     name = write("import time; print('ready', flush=True); time.sleep(60)")
     parent = (
         "import os, sys, time, pathlib\n"
+        "from ccr_ros.demo.parts import Part\n"
         "from ccr_ros.demo.processes import Children\n"
         f"children = Children(pathlib.Path({str(tmp_path)!r}), os.environ)\n"
-        f"child = children.start('sleeper', {name!r})\n"
+        f"child = children.start(Part('sleeper', ({name!r},), ''))\n"
         "while 'ready' not in child.output: time.sleep(0.02)\n"
         "print(child.pid, flush=True)\n"
         "time.sleep(60)\n"

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from ccr_ros.demo.script import BALL
+from ccr_ros.runtime import real_ros
 from ccr_ros.viz.recording_json import load_recording
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -100,7 +101,31 @@ def test_a_run_leaves_valid_files_of_fingers_that_move_and_touch(start):
     assert demo.wait() == 0, demo.out + demo.err
     assert all(gone(pid) for pid in demo.pids())
     assert demo.err == ""
+    check_what_it_left(demo)
 
+
+@pytest.mark.skipif(real_ros(), reason="ROS 2 has transports of its own")
+def test_a_run_within_one_process_leaves_the_same(start):
+    demo = start("--seconds", "4", EMBEDDED_ROS_TRANSPORT="local")
+    assert demo.wait() == 0, demo.out + demo.err
+    nodes = "solver_node (in this process) and pull_publisher (in this process)"
+    assert f"started {nodes}\n" in demo.out
+    (line,) = demo.err.splitlines()
+    assert line.startswith("embedded_ros: nodes reach each other within this process only")
+    check_what_it_left(demo)
+
+
+@pytest.mark.skipif(real_ros(), reason="ROS 2 has transports of its own")
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_signals_end_a_run_within_one_process(start, number, code):
+    demo = start("--seconds", "20", EMBEDDED_ROS_TRANSPORT="local")
+    demo.until(r"^(open|close) ")
+    demo.process.send_signal(number)
+    assert demo.wait() == code
+    assert demo.err.splitlines()[1:] == ["ccr: interrupted; what the demo had started has ended"]
+
+
+def check_what_it_left(demo):
     folder = demo.folder / "demo"
     assert sorted(p.name for p in folder.iterdir()) == [
         "recording.json",

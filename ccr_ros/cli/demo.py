@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Three fingers move on a ROS graph: the solver node and a publisher of cable pulls, as processes
 of their own, in a ROS domain of their own (unless ROS_DOMAIN_ID is set). They close on a ball and
-open again, one of them in its own rhythm.
+open again, one of them in its own rhythm. Without ROS 2 and cyclonedds, all run in one process.
 
 It leaves, in DIR: replay.html (open it in a browser), strip.png and recording.json; and prints what
 was measured. Exit code: 0 done, 1 a process failed, 2 bad input.
@@ -36,7 +36,7 @@ def run(args: argparse.Namespace) -> int:
         InvalidFile, InvalidValue: The folder cannot be written to, or the time is out of range.
     """
     # Here, so that `ccr demo --help` stays quick.
-    from ccr_ros.demo.processes import DemoFailed
+    from ccr_ros.demo.parts import DemoFailed
     from ccr_ros.demo.progress import Progress
     from ccr_ros.demo.session import run_demo
 

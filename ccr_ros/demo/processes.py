@@ -15,18 +15,13 @@ from pathlib import Path
 from types import FrameType, TracebackType
 from typing import Any
 
-from ccr_ros.model import CcrError
+from .parts import Part, Started
 
 _GRACE = 3.0  # s that a program has to end by itself when it is told to
-_TAIL = 8  # lines of its output that are shown when it fails
 _PR_SET_PDEATHSIG = 1
 
 
-class DemoFailed(CcrError):
-    """The demo could not be carried through; its text says why."""
-
-
-class Child:
+class Child(Started):
     """One running program, in a process group of its own, its output in a file."""
 
     def __init__(
@@ -47,34 +42,15 @@ class Child:
                 preexec_fn=_end_with_parent(),
             )
         self.pid = self._process.pid
+        self.where = f"process {self.pid}"
 
     @property
     def exit_code(self) -> int | None:
-        """The exit code, ``None`` while it runs; minus the signal's number if one ended it."""
         return self._process.poll()
 
     @property
     def output(self) -> str:
-        """What it has written so far."""
         return self._log.read_text(encoding="utf-8", errors="replace")
-
-    def failure(self, what: str) -> DemoFailed:
-        """Return an error that says what went wrong with it, with the end of its output."""
-        return DemoFailed(f"{self.name} {what}; {self.last_words()}")
-
-    def last_words(self) -> str:
-        """Return the last lines of its output, introduced and indented."""
-        lines = [line for line in self.output.splitlines() if line.strip()][-_TAIL:]
-        said = "\n".join(f"     {line}" for line in lines) or "     (nothing)"
-        return f"the last it said:\n{said}"
-
-    def ended(self) -> DemoFailed:
-        """Return an error that says that, and how, it ended."""
-        code = self.exit_code
-        how = f"exit code {code}"
-        if code is not None and code < 0:
-            how = f"killed by {signal.Signals(-code).name}"
-        return self.failure(f"(process {self.pid}) ended too early ({how})")
 
     def signal_group(self, number: int) -> None:
         """Send a signal to the program and all it has started, if it still runs."""
@@ -125,11 +101,12 @@ class Children:
                 child.signal_group(signal.SIGKILL)
                 child.wait(time.monotonic() + _GRACE)
 
-    def start(self, name: str, module: str, *args: str) -> Child:
-        """Start ``python -m module`` with this interpreter."""
+    def start(self, part: Part, *ros_args: str) -> Child:
+        """Start a program with this interpreter."""
         # -P: not whatever lies in the current folder.
-        command = [sys.executable, "-P", "-m", module, *args]
-        self._children.append(Child(name, command, self._logs / f"{name}.log", self._env))
+        command = [sys.executable, "-P", "-m", *part.program, *ros_args]
+        log = self._logs / f"{part.name}.log"
+        self._children.append(Child(part.name, command, log, self._env))
         return self._children[-1]
 
 

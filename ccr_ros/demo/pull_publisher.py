@@ -15,8 +15,9 @@ from typing import Any
 import rclpy
 from ccr_msgs.msg import CablePulls, FingerState, Object, ObjectArray
 from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
+from rclpy.context import Context
 from rclpy.exceptions import ParameterException
-from rclpy.executors import ExternalShutdownException
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.task import Future
 from shape_msgs.msg import SolidPrimitive
@@ -139,14 +140,23 @@ def _objects(header: Header) -> ObjectArray:
     return ObjectArray(header=header, objects=[item])
 
 
+def play(context: Context | None = None) -> str:
+    """Play the script once in a context (default: rclpy's own); return what was sent, as JSON.
+
+    Returns an empty text when the context ends before the script does.
+    """
+    node = PullPublisher(context=context)
+    executor = None if context is None else SingleThreadedExecutor(context=context)
+    rclpy.spin_until_future_complete(node, node.done, executor)
+    return json.dumps({"pulls_sent": node.sent}) if node.done.done() else ""
+
+
 def main(args: Sequence[str] | None = None) -> int:
     """Play the script once; print what was sent as one line of JSON; return the exit code."""
     try:
         rclpy.init(args=args)
-        node = PullPublisher()
-        rclpy.spin_until_future_complete(node, node.done)
-        if node.done.done():
-            print(json.dumps({"pulls_sent": node.sent}), flush=True)
+        if sent := play():
+            print(sent, flush=True)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     except (CcrError, ParameterException) as error:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The demo from start to end: processes started, watched, recorded; files and figures left."""
+"""The demo from start to end: nodes started, watched, recorded; files and figures left."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ import json
 import os
 import tempfile
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +21,8 @@ from ccr_ros.viz.recording import Recording
 from .environment import graph_environment, import_environment
 from .measurements import Report
 from .output import prepare_folder, write_files
-from .processes import Child, Children, DemoFailed, SignalGuard
+from .parts import DemoFailed, Part, Started, Starter
+from .processes import Children, SignalGuard
 from .progress import Progress
 from .script import GRIPPER_FILE, PullScript
 
@@ -28,6 +30,10 @@ if TYPE_CHECKING:
     from .recorder import Recorder
 
 NAMESPACE = "/gripper"
+SOLVER = Part(
+    "solver_node", ("ccr_ros.cli", "run", "solver_node"), "ccr_ros.nodes.solver_node:spin"
+)
+PULLER = Part("pull_publisher", ("ccr_ros.demo",), "ccr_ros.demo.pull_publisher:play")
 
 _START_TIMEOUT = 30.0  # s until the solver's first poses, and from these to the first pulls
 _SILENCE_TIMEOUT = 5.0  # s without any pose while pulls are published
@@ -45,7 +51,7 @@ def run_demo(folder: Path, seconds: float, progress: Progress) -> list[Path]:
         progress: Told what happens.
 
     Raises:
-        DemoFailed: A process did not appear, ended or fell silent, or another node is in the way.
+        DemoFailed: A node did not appear, ended or fell silent, or another one is in the way.
         InvalidFile: A file cannot be written.
         InvalidValue: The time is out of its range.
         RuntimeMissing: There is no rclpy.
@@ -58,7 +64,9 @@ def run_demo(folder: Path, seconds: float, progress: Progress) -> list[Path]:
     with SignalGuard() as signals:
         started = time.monotonic()
         with signals.held():
-            recording, report = _Session(script, progress, signals).run(gripper, embedded)
+            session = _Session(script, progress, signals)
+            with _starter() as starter:
+                recording, report = session.run(gripper, embedded, starter)
         unit = force_unit(recording.forces_are)
         progress.say(f"the fingers have moved ({time.monotonic() - started:.1f} s); measured:")
         progress.say("\n".join(f"  {line}" for line in report.lines(unit)))
@@ -69,37 +77,32 @@ def run_demo(folder: Path, seconds: float, progress: Progress) -> list[Path]:
 
 
 class _Session:
-    """Two processes and the recorder in this one, for the time of one script."""
+    """Two nodes and the recorder, for the time of one script."""
 
     def __init__(self, script: PullScript, progress: Progress, signals: SignalGuard) -> None:
         self._script = script
         self._progress = progress
         self._signals = signals
 
-    def run(self, gripper: Any, embedded: bool) -> tuple[Recording, Report]:
+    def run(self, gripper: Any, embedded: bool, starter: Starter) -> tuple[Recording, Report]:
         """Play the script and return what was recorded and measured."""
-        environ = {**os.environ, **import_environment(os.environ)}
         remap = ("--ros-args", "-r", f"__ns:={NAMESPACE}", "-p", f"gripper_file:={GRIPPER_FILE}")
         seconds = ("-p", f"seconds:={float(self._script.seconds)!r}")
-        with tempfile.TemporaryDirectory(prefix="ccr_demo_") as logs:
-            with Children(Path(logs), environ) as children:
-                solver = children.start("solver_node", "ccr_ros.cli", "run", "solver_node", *remap)
-                puller = children.start("pull_publisher", "ccr_ros.demo", *remap, *seconds)
-                self._progress.say(_introduction(embedded, solver, puller))
-                recorder, executor, context = _join(gripper)
-                try:
-                    self._watch(executor, recorder, solver, puller)
-                finally:
-                    executor.shutdown()
-                    context.try_shutdown()
-            report = recorder.measurements.report(_pulls_sent(puller))
-            if report.stale:
-                self._progress.say(
-                    f"{solver.name} could not solve all pulls; {solver.last_words()}"
-                )
-            return recorder.recording(), report
+        solver = starter.start(SOLVER, *remap)
+        puller = starter.start(PULLER, *remap, *seconds)
+        self._progress.say(_introduction(embedded, solver, puller))
+        recorder, executor, context = _join(gripper)
+        try:
+            self._watch(executor, recorder, solver, puller)
+        finally:
+            executor.shutdown()
+            context.try_shutdown()
+        report = recorder.measurements.report(_pulls_sent(puller))
+        if report.stale:
+            self._progress.say(f"{solver.name} could not solve all pulls; {solver.last_words()}")
+        return recorder.recording(), report
 
-    def _watch(self, executor: Any, recorder: Recorder, solver: Child, puller: Child) -> None:
+    def _watch(self, executor: Any, recorder: Recorder, solver: Started, puller: Started) -> None:
         """Spin until the publisher has ended and its last pulls are answered."""
         state_count, last_pose = 0, time.monotonic()
         started = last_look = last_pose
@@ -127,7 +130,7 @@ class _Session:
             raise solver.failure(f"answered no pulls of {silent}")
 
     def _check_progress(
-        self, recorder: Recorder, solver: Child, puller: Child, running: float, silence: float
+        self, recorder: Recorder, solver: Started, puller: Started, running: float, silence: float
     ) -> None:
         """Raise if a process takes longer than it should."""
         if rivals := recorder.rivals():
@@ -185,16 +188,35 @@ def _row(texts: Iterable[str]) -> str:
     return " ".join(texts)
 
 
-def _introduction(embedded: bool, solver: Child, puller: Child) -> str:
+@contextmanager
+def _starter() -> Iterator[Starter]:
+    """What starts the nodes as they can reach each other, and ends them with the block."""
+    import rclpy
+
+    if rclpy.get_rmw_implementation_identifier() == "embedded_local":
+        from .threads import Threads
+
+        with Threads(NAMESPACE[1:]) as threads:
+            yield threads
+    else:
+        environ = {**os.environ, **import_environment(os.environ)}
+        with (
+            tempfile.TemporaryDirectory(prefix="ccr_demo_") as logs,
+            Children(Path(logs), environ) as children,
+        ):
+            yield children
+
+
+def _introduction(embedded: bool, solver: Started, puller: Started) -> str:
     runtime = "embedded rclpy" if embedded else f"ROS 2 {os.environ.get('ROS_DISTRO', '')}".strip()
     domain = os.environ["ROS_DOMAIN_ID"]
     return (
         f"{runtime}, ROS_DOMAIN_ID {domain}, namespace {NAMESPACE}\n"
-        f"started {solver.name} (process {solver.pid}) and {puller.name} (process {puller.pid})"
+        f"started {solver.name} ({solver.where}) and {puller.name} ({puller.where})"
     )
 
 
-def _pulls_sent(puller: Child) -> int:
+def _pulls_sent(puller: Started) -> int:
     for line in reversed(puller.output.splitlines()):
         if line.startswith("{"):
             return int(json.loads(line)["pulls_sent"])

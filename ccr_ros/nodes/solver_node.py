@@ -15,8 +15,9 @@ import rclpy
 from ccr_msgs.msg import ObjectArray
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.clock import Clock, ClockType
+from rclpy.context import Context
 from rclpy.exceptions import ParameterException
-from rclpy.executors import ExternalShutdownException
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.timer import Timer
@@ -226,17 +227,28 @@ def main(args: Sequence[str] | None = None) -> int:
         _shut_down()
 
 
+def spin(context: Context | None = None) -> None:
+    """Run the node in a context (default: rclpy's own) until this ends.
+
+    Raises:
+        CcrError, rclpy.exceptions.ParameterException: The node cannot start.
+    """
+    executor = None if context is None else SingleThreadedExecutor(context=context)
+    try:
+        rclpy.spin(SolverNode(context=context), executor)
+    except (CcrError, ParameterException):
+        raise
+    except Exception:  # among them ExternalShutdownException
+        # A signal takes the context down at once, and what is publishing just then fails.
+        if rclpy.ok(context=context):
+            raise
+
+
 def _run() -> int:
     try:
-        rclpy.spin(SolverNode())
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
+        spin()
     except (CcrError, ParameterException) as error:
         return _cannot_start(error)
-    except Exception:
-        # A signal takes the context down at once, and what is publishing just then fails.
-        if rclpy.ok():
-            raise
     return 0
 
 
