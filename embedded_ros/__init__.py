@@ -9,13 +9,14 @@ each other. Without cyclonedds, nodes of one process do.
 from __future__ import annotations
 
 import importlib.util
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 from .transport import chosen_transport
 
-__all__ = ["MissingDependencyError", "enable", "interface_folders"]
+__all__ = ["MissingDependencyError", "enable"]
 
 _REQUIRED = {
     "rosbags": "rosbags",
@@ -26,23 +27,6 @@ _REQUIRED = {
 
 class MissingDependencyError(ImportError):
     """A package that the embedded runtime needs is not installed."""
-
-
-def interface_folders(path: Path | str) -> list[Path]:
-    """The interface packages at `path`: the folder itself or its children that hold package.xml and
-    msg, srv or action.
-
-    :raises FileNotFoundError: `path` is no folder.
-    """
-    root = Path(path).resolve()
-    if not root.is_dir():
-        raise FileNotFoundError(f"interface path {root} is not a folder")
-    return [
-        folder
-        for folder in [root, *sorted(child for child in root.iterdir() if child.is_dir())]
-        if (folder / "package.xml").is_file()
-        and any((folder / kind).is_dir() for kind in ("msg", "srv", "action"))
-    ]
 
 
 def _is_ours(finder: object) -> bool:
@@ -67,13 +51,19 @@ def installed(name: str) -> bool:
 def enable(interface_paths: Sequence[Path | str] = ()) -> bool:
     """Serve rclpy and the interface packages, unless a real rclpy is installed.
 
-    :param interface_paths: folders that are, or directly hold, ROS interface packages (package.xml
-        beside msg/, srv/ or action/); their types become importable under the name in package.xml.
+    Interface packages (package.xml beside msg/, srv/ or action/) become importable under the name
+    in package.xml. They are looked for in `interface_paths`, then in the folders that the
+    environment variable EMBEDDED_ROS_INTERFACE_PATH lists, then below AMENT_PREFIX_PATH. The first
+    definition of a type counts, and goes before the one built in here.
+
+    :param interface_paths: folders that are or hold interface packages, such as a workspace's src.
     :return: True when this runtime serves rclpy, False when a real one is there and nothing was
         done. Calling again is harmless and adds further interface paths.
     :raises MissingDependencyError: a needed package is not installed.
     :raises FileNotFoundError: an interface path is no folder.
     :raises ValueError: EMBEDDED_ROS_TRANSPORT names no transport that is there.
+    :raises DefinitionError: a package.xml there cannot be read (in folders that the environment
+        names this is only warned of).
     """
     finder = next((f for f in sys.meta_path if _is_ours(f)), None)
     if finder is None:
@@ -95,6 +85,8 @@ def enable(interface_paths: Sequence[Path | str] = ()) -> bool:
 
         finder = InterfaceFinder(registry)
         sys.meta_path.insert(0, finder)
-    folders = [folder for path in interface_paths for folder in interface_folders(path)]
-    finder.add_packages(folders)  # type: ignore[attr-defined]
+        finder.add_paths(interface_paths)
+        finder.add_environment(os.environ)
+    else:
+        finder.add_paths(interface_paths)  # type: ignore[attr-defined]
     return True

@@ -6,8 +6,9 @@ unless they are installed.
 from __future__ import annotations
 
 import importlib.util
+import logging
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from importlib.abc import Loader, MetaPathFinder
 from importlib.machinery import ModuleSpec
 from pathlib import Path
@@ -16,7 +17,9 @@ from typing import Any
 
 from . import installed
 from .interfaces.classes import snake_case
-from .interfaces.registry import KINDS, Registry
+from .interfaces.packages import KINDS, folders_of_environment, interface_folders
+from .interfaces.registry import Registry
+from .interfaces.spec import DefinitionError
 
 #: packages of this folder that are served under their top-level name
 FACADES = ("rclpy", "rosidl_parser", "rosidl_runtime_py", "tf2_ros")
@@ -84,12 +87,25 @@ class InterfaceFinder(MetaPathFinder):
     def __init__(self, registry: Registry) -> None:
         self.registry = registry
         self.loader = _InterfaceLoader(registry)
-        self.packages: frozenset[str] = registry.packages
+        self.packages = registry.packages
 
-    def add_packages(self, folders: Iterable[Path]) -> None:
-        """Serve the interface packages in these folders as well."""
-        for folder in folders:
+    def add_paths(self, paths: Iterable[Path | str]) -> None:
+        """Serve the interface packages at or below these folders as well.
+
+        :raises FileNotFoundError: there is no such folder.
+        :raises DefinitionError: a package.xml there cannot be read.
+        """
+        for folder in [folder for path in paths for folder in interface_folders(path)]:
             self.registry.add_package(folder)
+        self.packages = self.registry.packages
+
+    def add_environment(self, environ: Mapping[str, str]) -> None:
+        """Serve the interface packages that environment variables lead to as well."""
+        for folder in folders_of_environment(environ):
+            try:
+                self.registry.add_package(folder)
+            except DefinitionError as error:
+                logging.getLogger("embedded_ros").warning("%s: package left out", error)
         self.packages = self.registry.packages
 
     def find_spec(

@@ -48,8 +48,9 @@ class Reader(Generator):
             self.primitive("uint32", size)
             self.flush()
             if ftype.base == "wstring":
-                end = self.take(f"2 * {size}")
-                self.emit(f"{target} = str(data[pos:{end}], 'utf-16-le')")
+                end = self.take(f"4 * {size}")
+                units = f"array('H', unpack_from(f'{self.endian}{{{size}}}I', data, pos))"
+                self.emit(f"{target} = str({units}, 'utf-16-le')")
             else:
                 end = self.take(size)
                 self.emit(f"{target} = str(data[pos:{end} - 1], 'utf-8') if {size} else ''")

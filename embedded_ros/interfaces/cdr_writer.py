@@ -32,13 +32,18 @@ class Writer(Generator):
             self.emit(f"{holder} = {target}")
             self.message(spec, holder)
         elif ftype.base in STRINGS:
-            text = self.name("s")
-            wide = ftype.base == "wstring"
-            self.emit(f"{text} = {target}.encode('{'utf-16-le' if wide else 'utf-8'}')")
-            self.primitive("uint32", f"len({text}) // 2" if wide else f"len({text}) + 1")
+            text, wide = self.name("s"), ftype.base == "wstring"
+            if wide:
+                # UTF-16 code units, but each in the four bytes of a wchar_t: what ROS 2 sends.
+                self.emit(f"{text} = memoryview({target}.encode('utf-16-le')).cast('H')")
+            else:
+                self.emit(f"{text} = {target}.encode()")
+            self.primitive("uint32", f"len({text})" if wide else f"len({text}) + 1")
             self.flush()
-            self.emit(f"out += {text}")
-            if not wide:
+            if wide:
+                self.emit(f"out += pack(f'{self.endian}{{len({text})}}I', *{text})")
+            else:
+                self.emit(f"out += {text}")
                 self.emit("out += b'\\0'")
             self.forget(1)
         else:

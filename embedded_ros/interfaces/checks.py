@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from .spec import CODES, SIZES, FieldType
+from .spec import CODES, FieldType, int_range
 
 FLOAT32_MAX = 3.402823466e38
 
@@ -32,14 +32,6 @@ NUMPY_TYPES: dict[str, Any] = {
 
 #: takes (value, member name), returns what is to be stored or raises AssertionError
 Check = Callable[[Any, str], Any]
-
-
-def int_range(base: str) -> tuple[int, int]:
-    """Smallest and largest value of an integer type."""
-    bits = 8 * SIZES[base]
-    if base.startswith("u") or base == "char":
-        return 0, 2**bits - 1
-    return -(2 ** (bits - 1)), 2 ** (bits - 1) - 1
 
 
 def _fail(text: str) -> None:

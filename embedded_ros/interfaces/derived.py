@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The messages that a service or an action consists of, derived from its text as rosidl derives
-them.
+them, and the classes that group them.
 """
 
 from __future__ import annotations
@@ -9,7 +9,8 @@ from collections.abc import Callable
 from typing import Any
 
 from .classes import snake_case
-from .spec import Field, FieldType, MessageSpec, parse_message, split_sections
+from .parser import Section, parse_message
+from .spec import Field, FieldType, MessageSpec
 
 _UUID = Field("goal_id", FieldType("unique_identifier_msgs/msg/UUID"))
 
@@ -17,47 +18,62 @@ SERVICE_PARTS = ("Request", "Response", "Event")
 ACTION_PARTS = ("Goal", "Result", "Feedback")
 
 
-def _section(text: str, name: str) -> MessageSpec:
-    return parse_message(text, name)
+def _service(request: MessageSpec, response: MessageSpec) -> list[MessageSpec]:
+    """The messages of a service, and the service itself as its type description has it."""
+    name = request.name.removesuffix("_Request")
+    event = (
+        Field("info", FieldType("service_msgs/msg/ServiceEventInfo")),
+        Field("request", FieldType(request.name, "sequence", 1)),
+        Field("response", FieldType(response.name, "sequence", 1)),
+    )
+    whole = (
+        Field(f"{part.lower()}_message", FieldType(f"{name}_{part}")) for part in SERVICE_PARTS
+    )
+    return [
+        request,
+        response,
+        MessageSpec(f"{name}_Event", event),
+        MessageSpec(name, tuple(whole)),
+    ]
 
 
-def _event(name: str) -> MessageSpec:
-    return MessageSpec(
-        f"{name}_Event",
-        (
-            Field("info", FieldType("service_msgs/msg/ServiceEventInfo")),
-            Field("request", FieldType(f"{name}_Request", "sequence", 1)),
-            Field("response", FieldType(f"{name}_Response", "sequence", 1)),
-        ),
+def derive_service(sections: list[Section], name: str) -> list[MessageSpec]:
+    """Request, response and event of service `name` (``package/srv/Name``), and itself."""
+    request, response = sections
+    return _service(
+        parse_message(request, f"{name}_Request"), parse_message(response, f"{name}_Response")
     )
 
 
-def derive_service(text: str, name: str) -> list[MessageSpec]:
-    """Request, response and event of service `name` (``package/srv/Name``)."""
-    request, response = split_sections(text, 2, name)
-    parts = [_section(request, f"{name}_Request"), _section(response, f"{name}_Response")]
-    return [*parts, _event(name)]
-
-
-def derive_action(text: str, name: str) -> list[MessageSpec]:
-    """Goal, result and feedback of action `name` and the messages of its two services and its
-    feedback topic.
+def derive_action(sections: list[Section], name: str) -> list[MessageSpec]:
+    """Goal, result and feedback of action `name`, the messages of its two services and of its
+    feedback topic, and itself.
     """
-    sections = split_sections(text, 3, name)
-    parts = [_section(s, f"{name}_{p}") for s, p in zip(sections, ACTION_PARTS, strict=True)]
-    goal = Field("goal", FieldType(f"{name}_Goal"))
-    result = Field("result", FieldType(f"{name}_Result"))
-    feedback = Field("feedback", FieldType(f"{name}_Feedback"))
+    goal, result, feedback = (FieldType(f"{name}_{part}") for part in ACTION_PARTS)
     stamp = Field("stamp", FieldType("builtin_interfaces/msg/Time"))
+    whole = (
+        Field("goal", goal),
+        Field("result", result),
+        Field("feedback", feedback),
+        Field("send_goal_service", FieldType(f"{name}_SendGoal")),
+        Field("get_result_service", FieldType(f"{name}_GetResult")),
+        Field("feedback_message", FieldType(f"{name}_FeedbackMessage")),
+    )
     return [
-        *parts,
-        MessageSpec(f"{name}_SendGoal_Request", (_UUID, goal)),
-        MessageSpec(f"{name}_SendGoal_Response", (Field("accepted", FieldType("bool")), stamp)),
-        _event(f"{name}_SendGoal"),
-        MessageSpec(f"{name}_GetResult_Request", (_UUID,)),
-        MessageSpec(f"{name}_GetResult_Response", (Field("status", FieldType("int8")), result)),
-        _event(f"{name}_GetResult"),
-        MessageSpec(f"{name}_FeedbackMessage", (_UUID, feedback)),
+        *(parse_message(s, f"{name}_{p}") for s, p in zip(sections, ACTION_PARTS, strict=True)),
+        *_service(
+            MessageSpec(f"{name}_SendGoal_Request", (_UUID, Field("goal", goal))),
+            MessageSpec(f"{name}_SendGoal_Response", (Field("accepted", FieldType("bool")), stamp)),
+        ),
+        *_service(
+            MessageSpec(f"{name}_GetResult_Request", (_UUID,)),
+            MessageSpec(
+                f"{name}_GetResult_Response",
+                (Field("status", FieldType("int8")), Field("result", result)),
+            ),
+        ),
+        MessageSpec(f"{name}_FeedbackMessage", (_UUID, Field("feedback", feedback))),
+        MessageSpec(name, whole),
     ]
 
 

@@ -6,12 +6,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 from importlib.util import find_spec
 
-from embedded_ros.interfaces.registry import KINDS, registry
+from embedded_ros.interfaces.packages import KINDS
+from embedded_ros.interfaces.registry import registry
 
 
 def get_interface_packages() -> dict[str, str]:
     """Packages with interfaces, each with the folder it was read from (empty: built in)."""
-    return {package: registry.folder(package) for package in sorted(registry.packages)}
+    return {package: str(registry.folder(package) or "") for package in sorted(registry.packages)}
 
 
 def _interfaces(package_names: Iterable[str], kinds: Iterable[str]) -> dict[str, list[str]]:

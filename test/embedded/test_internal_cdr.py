@@ -7,15 +7,15 @@ import random
 import numpy as np
 import pytest
 from embedded_sample_msgs.msg import Everything, Nothing, Part
+from example_interfaces.msg import WString
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rclpy.serialization import deserialize_message, serialize_message
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from embedded_ros.interfaces.cdr import CdrError
-from embedded_ros.interfaces.checks import int_range
 from embedded_ros.interfaces.registry import registry
-from embedded_ros.interfaces.spec import FieldType
+from embedded_ros.interfaces.spec import FieldType, int_range
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 ALL_TYPES = sorted(STORE.fielddefs)
@@ -96,6 +96,16 @@ def test_known_bytes():
     expected = bytes.fromhex("00010000 01 00000000000000 0000000000000040 03000000 616200")
     assert serialize_message(part) == expected
     assert deserialize_message(expected, Part) == part
+
+
+def test_wide_characters_take_four_bytes():
+    # As rclpy writes them with rmw_cyclonedds_cpp: UTF-16 code units, each in four bytes.
+    message = WString(data="a\U0001f600b")
+    expected = bytes.fromhex("00010000 04000000 61000000 3dd80000 00de0000 62000000")
+    assert serialize_message(message) == expected
+    assert deserialize_message(expected, WString) == message
+    with pytest.raises(CdrError):
+        deserialize_message(expected[:8] + b"\0\0\1\0" + expected[12:], WString)
 
 
 def test_special_floats():

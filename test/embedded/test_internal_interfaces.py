@@ -16,8 +16,10 @@ from rosidl_runtime_py import message_to_yaml, set_message_fields
 
 import embedded_ros
 from embedded_ros.finder import InterfaceFinder
-from embedded_ros.interfaces.registry import Registry, package_name, registry
-from embedded_ros.interfaces.spec import DefinitionError, parse_message
+from embedded_ros.interfaces.packages import package_name
+from embedded_ros.interfaces.parser import parse_message, split_sections
+from embedded_ros.interfaces.registry import Registry, registry
+from embedded_ros.interfaces.spec import DefinitionError
 from embedded_ros.transport.cyclone_config import DiscoveryError, discovery_range, domain_xml
 from embedded_ros.transport.graph import dds_type_name, ros_type_name, split_topic
 
@@ -26,7 +28,7 @@ ROOT = Path(__file__).parents[2]
 
 def test_constants_and_defaults_of_a_custom_type():
     message = Everything()
-    assert (Everything.LIMIT, Everything.GREETING, Everything.HALF) == (7, "hello # world", 0.5)
+    assert (Everything.LIMIT, Everything.GREETING, Everything.HALF) == (7, "hello, world", 0.5)
     assert message.flag is True
     assert message.one == b"\x03"
     assert (message.letter, message.small, message.medium) == (65, -5, 16)
@@ -62,13 +64,51 @@ def test_bounds_of_a_custom_type(member, value):
         setattr(Everything(), member, value)
 
 
+def parse(text):
+    (section,) = split_sections(text, 1, "Some.msg")
+    return parse_message(section, "pkg/msg/Some")
+
+
 @pytest.mark.parametrize(
-    "line",
-    ["float64", "float64[ x", "int32 x=1.5", "unknown! x", "bool flag maybe", "int8 9lives"],
+    ("line", "reason"),
+    [
+        ("float64", "expected"),
+        ("float64[ x", "type"),
+        ("float64[0] x", "type"),
+        ("float64[<=] x", "bound"),
+        ("float64<=3 x", "only strings"),
+        ("string<=0 x", "type"),
+        ("int32 X=1.5", "1.5"),
+        ("uint8 X=256", "0 to 255"),
+        ("int8 x -129", "-128 to 127"),
+        ("byte x 0x100", "0 to 255"),
+        ("int32[] X=[1]", "constant"),
+        ("Other X=1", "constant"),
+        ("int32 lower=1", "CAPITALS"),
+        ("unknown! x", "neither"),
+        ("lower_case x", "neither"),
+        ("three/part/Names x", "neither"),
+        ("bool flag maybe", "boolean"),
+        ("int8 9lives", "member"),
+        ("int8 camelCase", "member"),
+        ("int8 two__underscores", "member"),
+        ("int8 ends_", "member"),
+        ("int8 class", "Python"),
+        ("int32 fine", "two members"),
+        ("int32[2] x [1]", "1 values"),
+        ("int32[<=1] x [1, 2]", "2 values"),
+        ("int32[] x 1, 2", "expected"),
+        ("Other x 1", "no default"),
+        ("string<=2 x abc", "longer"),
+        ('string x "a"b"', "backslash"),
+        ('string[] x ["a]', "strings"),
+        ("string[] x [a,,b]", "strings"),
+    ],
 )
-def test_bad_definitions_name_the_line(line):
-    with pytest.raises(DefinitionError, match="pkg/msg/Bad, line 2"):
-        parse_message(f"int32 fine\n{line}\n", "pkg/msg/Bad")
+def test_bad_definitions_name_the_line(line, reason):
+    with pytest.raises(DefinitionError, match=f"^Some.msg:2: .*{reason}") as caught:
+        parse(f"int32 fine\n{line}\n")
+    assert "\n" not in str(caught.value)
 
 
 def test_services_and_actions_of_a_custom_package():
