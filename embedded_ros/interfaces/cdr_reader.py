@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from .cdr_generator import Generator, flat_layout, uniform_format
-from .spec import CODES, SIZES, STRINGS, FieldType
+from .spec import CODES, NUMPY_TYPES, SIZES, STRINGS, FieldType
 
 
 class Reader(Generator):
@@ -109,11 +109,11 @@ class Reader(Generator):
         self, ftype: FieldType, target: str, count: str, end: str, code: str, leaves: list
     ) -> None:
         if ftype.is_numeric and ftype.kind == "array":
-            kind = np.dtype(self.endian + CODES[ftype.base])
-            native = kind.newbyteorder("=")
-            self.scope[f"T{kind.str[1:]}"], self.scope[f"N{kind.str[1:]}"] = kind, native
-            name = kind.str[1:]
-            self.emit(f"{target} = np.frombuffer(data, T{name}, {count}, pos).astype(N{name})")
+            native = np.dtype(NUMPY_TYPES[ftype.base])
+            name = native.name
+            self.scope[f"N_{name}"] = native
+            self.scope[f"T_{name}"] = native.newbyteorder(self.endian)
+            self.emit(f"{target} = np.frombuffer(data, T_{name}, {count}, pos).astype(N_{name})")
         elif ftype.is_numeric:
             values = self.name("a")
             self.emit(f"{values} = {target} = array('{code}')")

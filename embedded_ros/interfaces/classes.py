@@ -11,8 +11,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from .checks import NUMPY_TYPES, field_check
-from .spec import CODES, Field, FieldType, MessageSpec
+from .checks import field_check, numeric_converter
+from .spec import CODES, NUMPY_TYPES, Field, FieldType, MessageSpec
 
 _UNSET: Any = object()
 
@@ -33,6 +33,9 @@ class MessageMeta(type):
         if name in cls._constants_:
             raise AttributeError(f"can't set the constant {cls.__name__}.{name}")
         super().__setattr__(name, value)
+
+    def __delattr__(cls, name: str) -> None:
+        raise AttributeError(f"can't delete {cls.__name__}.{name}")
 
 
 class _SlotTypes:
@@ -129,18 +132,20 @@ def _default_factory(member: Field, classes: Callable[[str], type]) -> Callable[
     return lambda: np.array(values, dtype=NUMPY_TYPES[ftype.base])
 
 
+def _refuse(unknown: dict[str, Any]) -> None:
+    names = ", ".join(sorted(unknown))
+    raise AssertionError(f"Invalid arguments passed to constructor: {names}")
+
+
 def _make_members(spec: MessageSpec, classes: Callable[[str], type]) -> dict[str, Any]:
     """Write ``__init__`` (keyword arguments only, defaults made only where needed) and the
     properties.
     """
-    scope: dict[str, Any] = {"UNSET": _UNSET}
-    names = [member.name for member in spec.fields]
-    arguments = "".join(f"{name}=UNSET, " for name in names)
-    lines = [f"def __init__(self, {'*, ' + arguments if names else ''}**unknown):"]
-    lines.append("    unknown.pop('check_fields', None)")
-    lines.append("    if unknown:")
-    lines.append("        raise AssertionError('Invalid arguments passed to constructor: '")
-    lines.append("                             + ', '.join(sorted(unknown)))")
+    scope: dict[str, Any] = {"UNSET": _UNSET, "_refuse": _refuse}
+    # Members may have any lower-case name: what stands beside them begins with an underscore.
+    arguments = "".join(f"{member.name}=UNSET, " for member in spec.fields)
+    lines = [f"def __init__(_self, *, {arguments}check_fields=None, **_unknown):"]
+    lines.append("    if _unknown: _refuse(_unknown)")
     for member in spec.fields:
         name, ftype = member.name, member.type
         factory = _default_factory(member, classes)
@@ -148,8 +153,12 @@ def _make_members(spec: MessageSpec, classes: Callable[[str], type]) -> dict[str
             scope[f"D_{name}"], default = factory(), f"D_{name}"
         else:
             scope[f"D_{name}"], default = factory, f"D_{name}()"
-        lines.append(f"    if {name} is UNSET: self._{name} = {default}")
-        lines.append(f"    else: self.{name} = {name}")
+        given = name
+        if ftype.is_numeric and ftype.kind != "scalar" and member.default is None:
+            scope[f"N_{name}"] = numeric_converter(ftype)
+            given = f"N_{name}({name}, '{name}')"
+        lines.append(f"    if {name} is UNSET: _self._{name} = {default}")
+        lines.append(f"    else: _self.{name} = {given}")
     for member in spec.fields:
         name, ftype = member.name, member.type
         scope[f"check_{name}"] = field_check(ftype, classes)
@@ -177,12 +186,11 @@ def make_message_class(spec: MessageSpec, classes: Callable[[str], type]) -> typ
     for member in spec.fields:
         if member.default is not None:
             defaults[f"{member.name.upper()}__DEFAULT"] = _default_factory(member, classes)()
-    file_stem = re.sub(
-        r"_(Request|Response|Event|Goal|Result|Feedback|SendGoal.*|GetResult.*)$", "", name
-    )
+    # Messages have no underscores in their names; parts of services and actions do.
+    file_stem = name.split("_")[0]
     namespace: dict[str, Any] = {
         "__slots__": tuple("_" + member.name for member in spec.fields),
-        "__module__": f"{package}.{kind}._{snake_case(file_stem if kind != 'msg' else name)}",
+        "__module__": f"{package}.{kind}._{snake_case(file_stem)}",
         "__doc__": f"Message class '{name}' of {package}.",
         "_spec_": spec,
         "_fields_and_field_types": {m.name: m.type.idl_name() for m in spec.fields},

@@ -8,6 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 #: primitive -> code shared by the struct and array modules
 CODES = {
     "bool": "?",
@@ -25,6 +27,12 @@ CODES = {
     "float64": "d",
 }
 PRIMITIVES = frozenset(CODES)
+#: primitive -> type of the elements of a numpy array
+NUMPY_TYPES: dict[str, Any] = {
+    name: np.dtype("uint8" if name == "char" else name).type
+    for name in CODES
+    if name not in ("bool", "byte")
+}
 STRINGS = frozenset(("string", "wstring"))
 
 #: primitive -> bytes on the wire, which is also its alignment
