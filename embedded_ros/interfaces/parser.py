@@ -199,5 +199,5 @@ def _string_items(body: str) -> Iterator[str]:
             plain = double.replace('\\"', '"')
         elif single is not None:
             plain = single.replace("\\'", "'")
-        yield _unquoted(plain.strip())
+        yield _unescaped(_unquoted(plain.strip()))
         start = match.end()

@@ -158,6 +158,12 @@ class MessageSpec:
         return "".join(line + "\n" for line in lines)
 
 
+#: what a quoted string cannot hold as it is: # begins a comment, = makes a constant
+_ESCAPES = str.maketrans(
+    {"\\": r"\\", '"': r"\"", "#": r"\x23", "=": r"\x3d", "\n": r"\n", "\r": r"\r", "\t": r"\t"}
+)
+
+
 def _literal(value: Any) -> str:
     """A constant or default value as a definition writes it."""
     if isinstance(value, list):
@@ -166,4 +172,4 @@ def _literal(value: Any) -> str:
         return str(value).lower()
     if isinstance(value, bytes):
         return str(value[0])
-    return '"' + value.replace('"', '\\"') + '"' if isinstance(value, str) else str(value)
+    return f'"{value.translate(_ESCAPES)}"' if isinstance(value, str) else str(value)

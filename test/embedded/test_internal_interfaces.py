@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reading definitions, the import hook, and the discovery settings."""
+"""Custom types, the import hook, and the discovery settings."""
 
 import importlib
 import subprocess
@@ -16,10 +16,6 @@ from rosidl_runtime_py import message_to_yaml, set_message_fields
 
 import embedded_ros
 from embedded_ros.finder import InterfaceFinder
-from embedded_ros.interfaces.packages import package_name
-from embedded_ros.interfaces.parser import parse_message, split_sections
-from embedded_ros.interfaces.registry import Registry, registry
-from embedded_ros.interfaces.spec import DefinitionError
 from embedded_ros.transport.cyclone_config import DiscoveryError, discovery_range, domain_xml
 from embedded_ros.transport.graph import dds_type_name, ros_type_name, split_topic
 
@@ -64,53 +60,6 @@ def test_bounds_of_a_custom_type(member, value):
         setattr(Everything(), member, value)
 
 
-def parse(text):
-    (section,) = split_sections(text, 1, "Some.msg")
-    return parse_message(section, "pkg/msg/Some")
-
-
-@pytest.mark.parametrize(
-    ("line", "reason"),
-    [
-        ("float64", "expected"),
-        ("float64[ x", "type"),
-        ("float64[0] x", "type"),
-        ("float64[<=] x", "bound"),
-        ("float64<=3 x", "only strings"),
-        ("string<=0 x", "type"),
-        ("int32 X=1.5", "1.5"),
-        ("uint8 X=256", "0 to 255"),
-        ("int8 x -129", "-128 to 127"),
-        ("byte x 0x100", "0 to 255"),
-        ("int32[] X=[1]", "constant"),
-        ("Other X=1", "constant"),
-        ("int32 lower=1", "CAPITALS"),
-        ("unknown! x", "neither"),
-        ("lower_case x", "neither"),
-        ("three/part/Names x", "neither"),
-        ("bool flag maybe", "boolean"),
-        ("int8 9lives", "member"),
-        ("int8 camelCase", "member"),
-        ("int8 two__underscores", "member"),
-        ("int8 ends_", "member"),
-        ("int8 class", "Python"),
-        ("int32 fine", "two members"),
-        ("int32[2] x [1]", "1 values"),
-        ("int32[<=1] x [1, 2]", "2 values"),
-        ("int32[] x 1, 2", "expected"),
-        ("Other x 1", "no default"),
-        ("string<=2 x abc", "longer"),
-        ('string x "a"b"', "backslash"),
-        ('string[] x ["a]', "strings"),
-        ("string[] x [a,,b]", "strings"),
-    ],
-)
-def test_bad_definitions_name_the_line(line, reason):
-    with pytest.raises(DefinitionError, match=f"^Some.msg:2: .*{reason}") as caught:
-        parse(f"int32 fine\n{line}\n")
-    assert "\n" not in str(caught.value)
-
-
 def test_services_and_actions_of_a_custom_package():
     ask = embedded_sample_msgs.srv.Ask
     assert ask.Request.LOUD == 1
@@ -120,19 +69,6 @@ def test_services_and_actions_of_a_custom_package():
     assert move.Goal(target=1.0).target == 1.0
     assert (move.Result().reached, move.Feedback().done) == (0.0, 0.0)
     assert list(move.Impl.FeedbackMessage.get_fields_and_field_types()) == ["goal_id", "feedback"]
-
-
-def test_a_package_is_named_by_its_manifest(tmp_path):
-    (tmp_path / "msg").mkdir()
-    (tmp_path / "package.xml").write_text("<package><name>from_manifest</name></package>")
-    (tmp_path / "msg" / "Thing.msg").write_text("int32 x 5\n")
-    own = Registry()
-    assert own.add_package(tmp_path) == "from_manifest"
-    assert own.names("from_manifest", "msg") == ["Thing"]
-    assert own.message_class("from_manifest/msg/Thing")().x == 5
-    (tmp_path / "package.xml").write_text("<package><name>no/name</name></package>")
-    with pytest.raises(DefinitionError, match="no/name"):
-        package_name(tmp_path)
 
 
 def test_enabling_again_changes_nothing():
@@ -247,12 +183,6 @@ def test_names_on_the_wire():
     assert split_topic("rt/a/b") == ("topic", "/a/b")
     assert split_topic("rq/addRequest") == ("request", "/addRequest")
     assert split_topic("plain") == ("other", "plain")
-
-
-def test_unknown_interfaces_are_key_errors():
-    for name in ("std_msgs/msg/No", "std_srvs/srv/No_Request", "nothing/msg/X"):
-        with pytest.raises(KeyError):
-            registry.spec(name)
 
 
 def test_bytes_may_be_given_as_numbers_or_as_printed():
