@@ -6,13 +6,12 @@ import math
 import pytest
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from embedded_sample_msgs.msg import Everything
+from example_interfaces.msg import WString
 from geometry_msgs.msg import PoseStamped, PoseWithCovariance
 from rosidl_parser.definition import (
     Array,
     BasicType,
     BoundedSequence,
-    BoundedString,
     NamespacedType,
     UnboundedSequence,
     UnboundedString,
@@ -41,25 +40,33 @@ from rosidl_runtime_py.utilities import (
     is_service,
 )
 from sensor_msgs.msg import Image, JointState
-from std_msgs.msg import Header, Int8, String
+from shape_msgs.msg import SolidPrimitive
+from std_msgs.msg import Bool, Byte, Char, Float32, Header, Int8, String
 from std_srvs.srv import SetBool
 from tf2_msgs.action import LookupTransform
 
 
 def test_slot_types_describe_members():
-    types = get_message_slot_types(Everything)
-    assert types["flag"] == BasicType("boolean")
-    assert types["one"] == BasicType("octet")
-    assert types["letter"] == BasicType("uint8")
-    assert types["double_value"] == BasicType("double")
-    assert types["text"] == UnboundedString()
-    assert types["short_text"] == BoundedString(5)
-    assert types["wide"] == UnboundedWString()
-    assert types["pair"] == Array(UnboundedString(), 2)
-    assert types["bounded"] == BoundedSequence(BasicType("float"), 2)
-    assert types["numbers"] == UnboundedSequence(BasicType("int32"))
-    assert types["pose"] == NamespacedType(["geometry_msgs", "msg"], "PoseWithCovariance")
-    assert Everything().SLOT_TYPES is Everything.SLOT_TYPES
+    assert get_message_slot_types(JointState) == {
+        "header": NamespacedType(["std_msgs", "msg"], "Header"),
+        "name": UnboundedSequence(UnboundedString()),
+        "position": UnboundedSequence(BasicType("double")),
+        "velocity": UnboundedSequence(BasicType("double")),
+        "effort": UnboundedSequence(BasicType("double")),
+    }
+    types = {
+        Bool: BasicType("boolean"),
+        Byte: BasicType("octet"),
+        Char: BasicType("uint8"),
+        Float32: BasicType("float"),
+        WString: UnboundedWString(),
+    }
+    for cls, data in types.items():
+        assert (data,) == cls.SLOT_TYPES
+    solid = get_message_slot_types(SolidPrimitive)
+    assert solid["dimensions"] == BoundedSequence(BasicType("double"), 3)
+    pose = get_message_slot_types(PoseWithCovariance())
+    assert pose["covariance"] == Array(BasicType("double"), 36)
 
 
 def test_yaml_is_what_topic_echo_prints():
@@ -100,8 +107,8 @@ def test_long_values_can_be_cut_or_left_out():
     assert message_to_csv(report, no_arr=True).endswith(
         "<sequence type: diagnostic_msgs/msg/DiagnosticStatus, length: 1>"
     )
-    bounded = message_to_ordereddict(Everything(bounded=[1.0]), no_arr=True)["bounded"]
-    assert bounded == "<sequence type: float[2], length: 1>"
+    solid = message_to_ordereddict(SolidPrimitive(dimensions=[1.0]), no_arr=True)
+    assert solid["dimensions"] == "<sequence type: double[3], length: 1>"
 
 
 def test_comma_separated_values():
@@ -187,28 +194,24 @@ def test_names_that_mean_nothing_are_refused(get, name, error):
 
 
 def test_interfaces_are_listed():
-    assert {"std_msgs", "tf2_msgs", "embedded_sample_msgs"} <= set(get_interface_packages())
+    assert {"std_msgs", "tf2_msgs"} <= set(get_interface_packages())
     assert "rclpy" not in get_interface_packages()
     assert "msg/String" in get_message_interfaces(["std_msgs"])["std_msgs"]
     assert get_service_interfaces(["std_msgs", "rclpy"]) == {}
-    assert sorted(get_interfaces(["embedded_sample_msgs"])["embedded_sample_msgs"]) == [
-        "action/Move",
-        "msg/Everything",
-        "msg/Nothing",
-        "msg/Part",
-        "srv/Ask",
+    assert sorted(get_interfaces(["std_srvs"])["std_srvs"]) == [
+        "srv/Empty",
+        "srv/SetBool",
+        "srv/Trigger",
     ]
     assert get_action_interfaces()["tf2_msgs"] == ["action/LookupTransform"]
     with pytest.raises(LookupError, match="no_such_msgs"):
         get_interfaces(["no_such_msgs"])
 
 
-def test_files_of_interfaces_are_found():
-    assert get_interface_path("embedded_sample_msgs/msg/Part").endswith("msg/Part.msg")
-    assert get_interface_path("embedded_sample_msgs/srv/Ask.srv").endswith("srv/Ask.srv")
-    for name in ("Part", "embedded_sample_msgs//Part", "embedded_sample_msgs/../Part"):
+def test_wrong_names_have_no_file():
+    for name in ("Part", "std_msgs//String", "std_msgs/../String"):
         with pytest.raises(ValueError, match="Invalid name"):
             get_interface_path(name)
-    for name in ("no_such_msgs/msg/Part", "embedded_sample_msgs/msg/NoSuch"):
+    for name in ("no_such_msgs/msg/Part", "std_msgs/msg/NoSuch"):
         with pytest.raises(LookupError):
             get_interface_path(name)

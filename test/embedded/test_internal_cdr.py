@@ -137,10 +137,61 @@ def test_a_list_changed_to_something_else_is_an_error():
             "visualization_msgs/msg/MarkerArray",
             "RIHS01_86cb8800b6fb05b5eff1abd7a56f62a5641d3ae9a1c29e78e67e704f1d067dcf",
         ),
+        (
+            "action_msgs/srv/CancelGoal",
+            "RIHS01_573d8b0a534451d7bc2ac8c5ffde8ac14b8593b7001175d0cd6516dcbeb8689a",
+        ),
+        (
+            "action_msgs/srv/CancelGoal_Request",
+            "RIHS01_3d3c84653c1f96918086887e1dcb236faec88b81a5b14fd4cf4840065bcdf8af",
+        ),
+        (
+            "action_msgs/srv/CancelGoal_Event",
+            "RIHS01_178f81615ce6be41ad328211d7a56b08b00e73f41f0b8aec256b2f3ff97a5e7e",
+        ),
+        (
+            "example_interfaces/action/Fibonacci",
+            "RIHS01_9508051da1ea4658de144b09bd0690ff3de52104683d847aed764d2915906f51",
+        ),
+        (
+            "example_interfaces/action/Fibonacci_SendGoal",
+            "RIHS01_d1a57fb2a4afe8c21e34fb10db206f16ce6729b28531141472df92277c55b557",
+        ),
+        (
+            "example_interfaces/action/Fibonacci_FeedbackMessage",
+            "RIHS01_c1de71afd52e49a89c53d8262366884185bc0a02f78ce051c4e46b0a7fe59bb2",
+        ),
+        (
+            "example_interfaces/msg/Char",
+            "RIHS01_320dcd57e1183fb08463cc3ab50bf7e5ce0ecee39f64d15a9e9eeca3384c91a5",
+        ),
+        (
+            "example_interfaces/msg/WString",
+            "RIHS01_32033e06d9dfe5468c5d6e1dc8b7a23c8910bad071cfd4e151a951d580e68dd8",
+        ),
+        (
+            "std_srvs/srv/Empty_Request",
+            "RIHS01_458eaf200a3f63d9cc53d19436edebc0c140ef4c93ca75d5bd4ce19fd7759e35",
+        ),
     ],
 )
 def test_type_hashes(name, expected):
     assert registry.type_hash(name) == expected
+
+
+# rosbags takes char for IDL's char; in .msg files it is another name of uint8.
+WITH_CHAR = {
+    "service_msgs/msg/ServiceEventInfo",
+    "std_msgs/msg/Char",
+    "rmw_dds_common/msg/Gid",
+    "rmw_dds_common/msg/NodeEntitiesInfo",
+    "rmw_dds_common/msg/ParticipantEntitiesInfo",
+}
+
+
+@pytest.mark.parametrize("name", sorted({*ALL_TYPES} - WITH_CHAR))
+def test_type_hashes_as_rosbags_computes_them(name):
+    assert registry.type_hash(name) == STORE.hash_rihs01(name)
 
 
 def test_type_hash_of_a_custom_type_is_that_of_its_text():

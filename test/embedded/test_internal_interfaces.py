@@ -12,7 +12,15 @@ import numpy as np
 import pytest
 import yaml
 from embedded_sample_msgs.msg import Everything
-from rosidl_runtime_py import message_to_yaml, set_message_fields
+from rosidl_parser.definition import BoundedSequence, BoundedString, UnboundedWString
+from rosidl_runtime_py import (
+    get_interface_packages,
+    get_interface_path,
+    get_interfaces,
+    get_message_slot_types,
+    message_to_yaml,
+    set_message_fields,
+)
 
 import embedded_ros
 from embedded_ros.finder import InterfaceFinder
@@ -194,3 +202,23 @@ def test_bytes_may_be_given_as_numbers_or_as_printed():
     assert again == message
     with pytest.raises(AssertionError, match="one"):
         set_message_fields(message, {"one": 256})
+
+
+def test_tools_know_custom_types():
+    types = get_message_slot_types(Everything)
+    assert types["short_text"] == BoundedString(5)
+    assert types["labels"] == BoundedSequence(BoundedString(4), 2)
+    assert types["wide"] == UnboundedWString()
+    assert sorted(get_interfaces(["embedded_sample_msgs"])["embedded_sample_msgs"]) == [
+        "action/Move",
+        "msg/Everything",
+        "msg/Nothing",
+        "msg/Part",
+        "srv/Ask",
+    ]
+    home = Path(__file__).parent / "interfaces" / "sample_msgs"
+    assert get_interface_packages()["embedded_sample_msgs"] == str(home)
+    for name in ("embedded_sample_msgs/srv/Ask", "embedded_sample_msgs/srv/Ask.srv"):
+        assert get_interface_path(name) == str(home / "srv" / "Ask.srv")
+    with pytest.raises(LookupError, match="a file of"):
+        get_interface_path("std_msgs/msg/String")

@@ -5,6 +5,8 @@ import array
 import copy
 import math
 import pickle
+import re
+from collections import UserList, UserString
 
 import numpy as np
 import pytest
@@ -23,7 +25,17 @@ from rclpy.type_support import (
 )
 from sensor_msgs.msg import Image, JointState, NavSatStatus
 from shape_msgs.msg import SolidPrimitive
-from std_msgs.msg import Bool, ColorRGBA, Float32, Float64MultiArray, Int8, String, UInt8, UInt16
+from std_msgs.msg import (
+    Bool,
+    ColorRGBA,
+    Float32,
+    Float64MultiArray,
+    Header,
+    Int8,
+    String,
+    UInt8,
+    UInt16,
+)
 from std_srvs.srv import SetBool, Trigger
 from tf2_msgs.action import LookupTransform
 from visualization_msgs.msg import Marker, MarkerArray
@@ -67,6 +79,13 @@ def test_constants_are_on_the_class_and_read_only():
     assert DiagnosticStatus.ERROR == b"\x02"
     with pytest.raises(AttributeError):
         Marker.ARROW = 5
+    with pytest.raises(AttributeError):
+        del Marker.ARROW
+    with pytest.raises(AttributeError):
+        Marker().ARROW = 5
+    assert Quaternion.W__DEFAULT == 1.0
+    with pytest.raises(AttributeError):
+        Quaternion.W__DEFAULT = 0.0
 
 
 def test_field_types_are_listed():
@@ -138,6 +157,68 @@ def test_fixed_numeric_arrays_are_numpy():
     assert pose.covariance[35] == 35.0
 
 
+def test_constructors_convert_numbers():
+    # Assignment does not: there an int is no float.
+    assert JointState(position=[1, 2]).position == array.array("d", [1.0, 2.0])
+    assert JointState(position=np.arange(2)).position == array.array("d", [0.0, 1.0])
+    assert JointState(position=range(2)).position == array.array("d", [0.0, 1.0])
+    assert PoseWithCovariance(covariance=range(36)).covariance[35] == 35.0
+    own = array.array("d", [5.0])
+    assert JointState(position=own).position is not own
+    for value in (["a"], None, 1.0):
+        with pytest.raises(TypeError):
+            JointState(position=value)
+    with pytest.raises(OverflowError):
+        Image(data=[256])
+    with pytest.raises(AssertionError):
+        PoseWithCovariance(covariance=[0.0] * 35)
+    with pytest.raises(AssertionError):
+        SolidPrimitive(dimensions=[1.0] * 4)
+
+
+def test_collections_of_any_kind_are_taken():
+    state = JointState()
+    for value in (["a", "b"], ("a", "b"), UserList(["a", "b"])):
+        state.name = value
+        assert list(state.name) == ["a", "b"]
+    state.name = {"a"}
+    assert set(state.name) == {"a"}
+    for value in (UserString("ab"), iter(["a"]), {"a": "b"}, None):
+        with pytest.raises(AssertionError, match="'name' field must be a set or sequence"):
+            state.name = value
+    state.position = UserList([1.0])
+    assert state.position == array.array("d", [1.0])
+    image = Image()
+    image.data = b"ab"
+    assert image.data == array.array("B", [97, 98])
+    pose = PoseWithCovariance()
+    pose.covariance = own = np.zeros((6, 6))
+    assert pose.covariance is own
+
+
+def test_errors_say_what_is_wanted():
+    for message, member, value, wanted in [
+        (Int8(), "data", 128, "The 'data' field must be an integer in [-128, 127]"),
+        (Pose(), "position", 1, "The 'position' field must be a sub message of type 'Point'"),
+        (Header(), "frame_id", 1, "The 'frame_id' field must be of type 'str'"),
+        (
+            JointState(),
+            "name",
+            [1],
+            "The 'name' field must be a set or sequence and each value of type 'str'",
+        ),
+        (
+            OccupancyGrid(),
+            "data",
+            [128],
+            "The 'data' field must be a set or sequence and each value of type 'int' "
+            "and each integer in [-128, 127]",
+        ),
+    ]:
+        with pytest.raises(AssertionError, match=f"^{re.escape(wanted)}$"):
+            setattr(message, member, value)
+
+
 def test_float_members_take_infinity_and_nan():
     assert math.isinf(Point(x=math.inf).x)
     assert math.isnan(ColorRGBA(r=math.nan).r)
@@ -175,6 +256,9 @@ def test_copy_and_pickle():
     marker = Marker(ns="a", points=[Point(x=1.0)], colors=[ColorRGBA(a=1.0)])
     assert copy.deepcopy(marker) == marker
     assert pickle.loads(pickle.dumps(marker)) == marker
+    assert copy.deepcopy(marker).points is not marker.points
+    feedback = LookupTransform.Impl.FeedbackMessage()
+    assert pickle.loads(pickle.dumps(feedback)) == feedback
 
 
 def test_services_group_their_messages():
