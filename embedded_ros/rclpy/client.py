@@ -65,7 +65,9 @@ class Client(ServiceEnd):
         """
         if not isinstance(request, self.srv_type.Request):
             raise TypeError(f"Expected {self.srv_type.Request}, got {type(request)}")
-        future = Future()
+        return self._send_request(request, Future())
+
+    def _send_request(self, request: Any, future: Future) -> Future:
         number = next(self._numbers)
         with self._lock:
             self._pending_requests[number] = future

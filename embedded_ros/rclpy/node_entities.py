@@ -56,25 +56,30 @@ class EntityHolder:
     def _full_name(self, name: str, service: bool = False, remap: bool = True) -> str:
         raise NotImplementedError
 
+    def _public(self, entities: list[Any]) -> list[Any]:
+        """Without those that actions consist of: an action is one waitable."""
+        parts = {part for one in self._waitables for part in getattr(one, "_parts", ())}
+        return [entity for entity in entities if entity not in parts]
+
     @property
     def publishers(self) -> Iterator[Publisher]:
         """The publishers created here."""
-        yield from self._publishers
+        yield from self._public(self._publishers)
 
     @property
     def subscriptions(self) -> Iterator[Subscription]:
         """The subscriptions created here."""
-        yield from self._subscriptions
+        yield from self._public(self._subscriptions)
 
     @property
     def clients(self) -> Iterator[Client]:
         """The service clients created here."""
-        yield from self._clients
+        yield from self._public(self._clients)
 
     @property
     def services(self) -> Iterator[Service]:
         """The services created here."""
-        yield from self._services
+        yield from self._public(self._services)
 
     @property
     def timers(self) -> Iterator[Timer]:
