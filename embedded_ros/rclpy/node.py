@@ -23,6 +23,7 @@ from .node_entities import EntityHolder
 from .node_graph import GraphViewer
 from .node_parameters import ParameterHolder
 from .parameter import Parameter
+from .parameter_service import ParameterService
 from .qos import qos_profile_parameter_events
 from .time_source import TimeSource
 from .utilities import get_default_context
@@ -58,6 +59,7 @@ class Node(ParameterHolder, EntityHolder, GraphViewer, Destroyable):
 
         :param cli_args: arguments for this node alone, as after ``--ros-args``.
         :param use_global_arguments: whether the process's arguments count as well.
+        :param start_parameter_services: whether others may read and set parameters.
         :param parameter_overrides: initial values that beat all others.
         :raises NotInitializedException: the context is not initialised.
         :raises InvalidNodeNameException: the name is invalid; InvalidNamespaceException likewise.
@@ -103,6 +105,8 @@ class Node(ParameterHolder, EntityHolder, GraphViewer, Destroyable):
             )
         self._time_source = TimeSource(node=self)
         self._time_source.attach_clock(self._clock)
+        if start_parameter_services:
+            self._parameter_service = ParameterService(self)
 
     @staticmethod
     def _free_descriptor() -> Any:

@@ -3,6 +3,7 @@
 
 import pytest
 from probe import shown
+from rcl_interfaces.srv import SetParameters
 from rclpy.exceptions import ParameterException
 from rclpy.parameter import Parameter
 from visualization_msgs.msg import Marker
@@ -158,3 +159,24 @@ def test_markers_can_be_switched(probe, start, small_gripper):
     assert node.set_parameters([Parameter("markers", value=False)])[0].successful
     probe.until(lambda: arrays[-1].markers[0].action == Marker.DELETEALL, "their deletion")
     assert len(arrays[-1].markers) == 1
+
+
+def test_others_set_parameters_through_the_service(probe, start, small_gripper):
+    node = start(gripper_file=small_gripper, markers=False)
+    arrays = probe.markers()
+    client = probe.node.create_client(SetParameters, f"{node.get_name()}/set_parameters")
+    assert client.wait_for_service(15.0)
+
+    def set_from_outside(**values):
+        wanted = [Parameter(name, value=v).to_parameter_msg() for name, v in values.items()]
+        future = client.call_async(SetParameters.Request(parameters=wanted))
+        return probe.until(future.done) and list(future.result().results)
+
+    (result,) = set_from_outside(markers=True)
+    assert result.successful
+    probe.until(lambda: arrays and shown(arrays[-1], "thumb/backbone"), "markers")
+    for name, value in (("marker_rate", -1.0), ("gripper_file", "other"), ("no_such", 1)):
+        (result,) = set_from_outside(**{name: value})
+        assert not result.successful
+        assert name in result.reason or name == "no_such"
+    probe.pull_and_wait("thumb", [0.005, 0.0])
