@@ -205,13 +205,13 @@ def parameter_dict_from_yaml_file(
         keys += [key for key in tree if key != "/**"]
     if not keys:
         raise RuntimeError("Param file does not contain selected parameters")
-    result: dict[str, Any] = {}
+    wanted: dict[str, Any] = {}
     for key in keys:
         branch = tree[key]
         if not isinstance(branch, dict) or "ros__parameters" not in branch:
             raise RuntimeError(f"YAML file is not a valid ROS parameter file for node {key}")
-        result.update(_messages(branch["ros__parameters"], namespace))
-    return result
+        wanted.update(branch["ros__parameters"])
+    return _messages(wanted, namespace)
 
 
 def _messages(tree: dict[str, Any], prefix: str) -> dict[str, Any]:
