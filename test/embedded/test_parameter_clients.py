@@ -82,8 +82,8 @@ def test_set(holder, client, result, user, spin):
     done = []
     wanted = [Parameter("number", value=5), Parameter("free", value=2.5).to_parameter_msg()]
     future = client.set_parameters(wanted, callback=done.append)
-    assert [one.successful for one in result(future).results] == [True, True]
-    assert spin(lambda: done == [future], user)
+    assert spin(lambda: done == [future], holder, user)
+    assert [one.successful for one in future.result().results] == [True, True]
     assert [holder.get_parameter(name).value for name in ("number", "free")] == [5, 2.5]
     wanted = [Parameter("number", value=6), Parameter("absent", value=1)]
     assert not result(client.set_parameters_atomically(wanted)).result.successful
