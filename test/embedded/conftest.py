@@ -73,6 +73,35 @@ def spin(context):
     return run
 
 
+@pytest.fixture
+def executor(context):
+    """A single-threaded executor."""
+    chosen = SingleThreadedExecutor(context=context)
+    yield chosen
+    chosen.shutdown()
+
+
+@pytest.fixture
+def finish(spin, executor):
+    """Spin the executor until a future is done, and give its result."""
+
+    def run(future):
+        assert spin(future.done, executor=executor)
+        return future.result()
+
+    return run
+
+
+@pytest.fixture
+def bench(make_node, executor, spin, finish):
+    """An action server and a client."""
+    from action_bench import Bench
+
+    chosen = Bench(make_node, executor, spin, finish)
+    yield chosen
+    chosen.close()
+
+
 class Program:
     """A test program in a process of its own."""
 

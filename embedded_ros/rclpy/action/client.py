@@ -124,6 +124,7 @@ class ActionClient(ActionEnd):
         super().__init__(node, action_type, action_name, callback_group, "client")
         # Handles that the user has dropped need no status.
         self._goal_handles: dict[bytes, weakref.ref[ClientGoalHandle]] = {}
+        self._statuses: dict[bytes, int] = {}
         self._feedback_callbacks: dict[bytes, Callable[[Any], Any]] = {}
         types = action_type.Impl
         self._goals = self._client(types.SendGoalService, "send_goal", goal_service_qos_profile)
@@ -171,13 +172,12 @@ class ActionClient(ActionEnd):
             await await_or_execute(callback, message)
 
     def _on_status(self, message: Any) -> None:
-        for entry in message.status_list:
-            key = bytes(entry.goal_info.goal_id.uuid)
-            reference = self._goal_handles.get(key)
-            handle = reference() if reference is not None else None
-            if handle is not None:
-                handle._status = entry.status
-            if handle is None or entry.status in _ENDED:
+        self._statuses = {bytes(s.goal_info.goal_id.uuid): s.status for s in message.status_list}
+        for key, reference in list(self._goal_handles.items()):
+            handle = reference()
+            if handle is not None and key in self._statuses:
+                handle._status = self._statuses[key]
+            if handle is None or handle._status in _ENDED:
                 self._goal_handles.pop(key, None)
 
     def _accept(self, goal_id: Any, response: Any) -> ClientGoalHandle:
@@ -188,6 +188,8 @@ class ActionClient(ActionEnd):
         elif key in self._goal_handles:
             raise RuntimeError(f"Two goals were accepted with the same ID ({handle})")
         else:
+            # The status may be here before the response is.
+            handle._status = self._statuses.get(key, GoalStatus.STATUS_UNKNOWN)
             self._goal_handles[key] = weakref.ref(handle)
         return handle
 
