@@ -17,6 +17,11 @@ SHARE = f"share/{PACKAGE}"
 # to what is installed, and nothing else.
 HERE = Path(__file__).resolve().parent
 
+CYCLONE_WHEELS = (
+    "python_version < '3.14' and platform_python_implementation == 'CPython' and "
+    "(sys_platform == 'darwin' or platform_machine == 'x86_64' or platform_machine == 'AMD64')"
+)
+
 
 def tree(folder: str, *patterns: str) -> list[tuple[str, list[str]]]:
     """List the files below `folder` that match, as data_files entries under share/ccr_ros."""
@@ -57,8 +62,9 @@ setup(
     ],
     extras_require={
         # The rclpy of machines without ROS 2 (see embedded_ros); never needed under ROS 2.
-        # cyclonedds: each minor release may change the binding that embedded_ros relies on.
-        "embedded": ["cyclonedds>=11.0.1,<11.1", "rosbags>=0.11,<0.12"],
+        # cyclonedds: each minor release may change the binding that embedded_ros relies on. Asked
+        # for where there are wheels (11.0.1); elsewhere embedded_ros has a transport of its own.
+        "embedded": [f"cyclonedds>=11.0.1,<11.1; {CYCLONE_WHEELS}", "rosbags>=0.11,<0.12"],
         "plot": ["matplotlib>=3.8,<4"],
         "bench": ["scipy>=1.11,<2"],
         "dev": [

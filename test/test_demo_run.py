@@ -96,6 +96,7 @@ def heights(recording, name):
     return np.array([base.points(f.fingers[name].backbone[-1])[2] for f in recording.frames])
 
 
+@pytest.mark.processes
 def test_a_run_leaves_valid_files_of_fingers_that_move_and_touch(start):
     demo = start("--seconds", "4")
     assert demo.wait() == 0, demo.out + demo.err
@@ -165,6 +166,7 @@ def check_what_it_left(demo):
     assert re.search(r"^  markers +[1-9]", demo.out, re.MULTILINE)
 
 
+@pytest.mark.processes
 def test_a_solver_that_dies_is_reported(start):
     demo = start("--seconds", "20")
     solver, puller = demo.pids()
@@ -176,6 +178,7 @@ def test_a_solver_that_dies_is_reported(start):
     assert list((demo.folder / "demo").iterdir()) == []
 
 
+@pytest.mark.processes
 def test_a_publisher_that_dies_is_reported(start):
     demo = start("--seconds", "20")
     solver, puller = demo.pids()
@@ -186,6 +189,7 @@ def test_a_publisher_that_dies_is_reported(start):
     assert gone(solver)
 
 
+@pytest.mark.processes
 @pytest.mark.parametrize(
     ("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGHUP, 129)]
 )
@@ -207,6 +211,7 @@ def test_two_at_once_do_not_hear_each_other(start):
     assert len(domains) == 2
 
 
+@pytest.mark.processes
 @pytest.mark.long
 def test_two_in_one_domain_are_kept_apart(start):
     domain = os.environ["ROS_DOMAIN_ID"]

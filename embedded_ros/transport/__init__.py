@@ -97,7 +97,7 @@ def _say_what_is_missing() -> None:
 def _how_to_get_cyclone() -> str:
     """Why there is no cyclonedds, and what helps, within a sentence."""
     # The same condition as in setup.py.
-    machine, version = platform.machine(), sys.version_info
+    machine, version = platform.machine(), tuple(map(int, platform.python_version_tuple()[:2]))
     has_wheel = version < (3, 14) and (sys.platform == "darwin" or machine in ("x86_64", "AMD64"))
     if has_wheel and platform.python_implementation() == "CPython":
         return (
@@ -106,6 +106,6 @@ def _how_to_get_cyclone() -> str:
         )
     return (
         f"there is no wheel of cyclonedds for {platform.python_implementation()} "
-        f"{version.major}.{version.minor} on {platform.system()} {machine} (but for CPython 3.11 "
+        f"{version[0]}.{version[1]} on {platform.system()} {machine} (but for CPython 3.11 "
         "to 3.13 on macOS and on x86-64); ROS 2 itself serves as well"
     )
