@@ -50,10 +50,11 @@ class Reader(Generator):
             if ftype.base == "wstring":
                 end = self.take(f"4 * {size}")
                 units = f"array('H', unpack_from(f'{self.endian}{{{size}}}I', data, pos))"
-                self.emit(f"{target} = str({units}, 'utf-16-le')")
+                self.emit(f"{target} = str({units}, 'utf-16-le', 'replace')")
             else:
                 end = self.take(size)
-                self.emit(f"{target} = str(data[pos:{end} - 1], 'utf-8') if {size} else ''")
+                text = f"str(data[pos:{end} - 1], 'utf-8', 'replace')"
+                self.emit(f"{target} = {text} if {size} else ''")
             self.emit(f"pos = {end}")
             self.forget(1)
         else:

@@ -25,6 +25,10 @@ class NodeNameNonExistentError(RCLError):
     """No node of that name is known."""
 
 
+class RMWError(RuntimeError):
+    """The middleware refused something, such as bytes that are no message."""
+
+
 class UnsupportedEventTypeError(RCLError):
     """The middleware has no event of that kind."""
 
@@ -48,6 +52,7 @@ __all__ = [
     "NodeNameNonExistentError",
     "RCLError",
     "RCLInvalidROSArgsError",
+    "RMWError",
     "UnknownROSArgsError",
     "UnsupportedEventTypeError",
 ]

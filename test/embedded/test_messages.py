@@ -17,7 +17,9 @@ from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Point, Pose, PoseWithCovariance, Quaternion, TransformStamped
 from nav_msgs.msg import OccupancyGrid
 from rcl_interfaces.msg import IntegerRange, ParameterDescriptor
+from rclpy._rclpy_pybind11 import RMWError
 from rclpy.exceptions import NoTypeSupportImportedException
+from rclpy.serialization import deserialize_message, serialize_message
 from rclpy.type_support import (
     check_for_type_support,
     check_is_valid_msg_type,
@@ -318,3 +320,22 @@ def test_module_contents():
         from std_msgs.msg import NoSuchMessage  # noqa: F401
     with pytest.raises(ModuleNotFoundError):
         import std_msgs.nothing
+
+
+def test_messages_become_bytes_and_come_back():
+    state = JointState(name=["a", "ü"], position=[1.0, math.inf])
+    payload = serialize_message(state)
+    assert isinstance(payload, bytes)
+    assert deserialize_message(payload, JointState) == state
+    # What another program sent as text need not be UTF-8.
+    latin = serialize_message(String(data="ue")).replace(b"ue", b"\xfce")
+    assert deserialize_message(latin, String).data == "\ufffde"
+    with pytest.raises(RMWError, match="failed to deserialize"):
+        deserialize_message(payload[:-9], JointState)
+    for wrong in (SetBool, int):
+        with pytest.raises(AttributeError):
+            serialize_message(wrong)
+    with pytest.raises(AttributeError):
+        deserialize_message(payload, int)
+    with pytest.raises(TypeError):
+        deserialize_message("text", String)
