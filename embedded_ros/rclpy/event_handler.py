@@ -205,7 +205,7 @@ class _EventCallbacks:
         self, callback_group: Any, entity: Any, topic_name: str
     ) -> list[EventHandler]:
         """Handlers for the callbacks that are set."""
-        logger = get_logger(entity.logger_name)
+        logger = get_logger(entity._node.get_logger().name)
 
         def refused(info: Any) -> None:
             policy = qos_policy_name_from_kind(info.last_policy_kind)

@@ -114,7 +114,7 @@ class EntityHolder:
         self,
         qos_or_depth: QoSProfile | int,
         kind: type[Publisher | Subscription],
-        full_topic: str,
+        topic: str,
         options: QoSOverridingOptions | None,
     ) -> QoSProfile:
         """A profile from what was given and, where options say so, from parameters."""
@@ -122,13 +122,14 @@ class EntityHolder:
             if options is None:
                 return qos_or_depth
             profile = copy.copy(qos_or_depth)
-            _declare_qos_parameters(kind, cast("Node", self), full_topic, profile, options)
+            full = self._full_name(topic)
+            _declare_qos_parameters(kind, cast("Node", self), full, profile, options)
             return profile
         if isinstance(qos_or_depth, int):
             if qos_or_depth < 0:
                 raise ValueError("history depth must be greater than or equal to zero")
             profile = QoSProfile(depth=qos_or_depth)
-            return self._profile(profile, kind, full_topic, options)
+            return self._profile(profile, kind, topic, options)
         raise TypeError(f"Expected QoSProfile or int, but received {type(qos_or_depth)!r}")
 
     def _announce(self, writer: Any = None, reader: Any = None, remove: bool = False) -> None:
@@ -159,21 +160,17 @@ class EntityHolder:
         :raises InvalidTopicNameException: the topic name is invalid.
         :raises InvalidQosOverridesError: the options' callback refuses what parameters ask for.
         """
-        full = self._full_name(topic)
-        profile = self._profile(qos_profile, Publisher, full, qos_overriding_options)
-        writer = self._open(msg_type, full, profile, writer=True)
+        profile = self._profile(qos_profile, Publisher, topic, qos_overriding_options)
         publisher = publisher_class(
-            writer,
+            cast("Node", self),
             msg_type,
             topic,
-            full,
             profile,
             event_callbacks=event_callbacks or PublisherEventCallbacks(),
             callback_group=callback_group or self._default_callback_group,
-            logger_name=self._logger.name,
         )
-        self._publishers.append(publisher)
         self._waitables.extend(publisher.event_handlers)
+        self._publishers.append(publisher)
         self._wake_executor()
         return publisher
 
@@ -195,20 +192,16 @@ class EntityHolder:
         :raises InvalidTopicNameException: the topic name is invalid.
         :raises InvalidQosOverridesError: the options' callback refuses what parameters ask for.
         """
-        full = self._full_name(topic)
-        profile = self._profile(qos_profile, Subscription, full, qos_overriding_options)
-        reader = self._open(msg_type, full, profile, writer=False)
+        profile = self._profile(qos_profile, Subscription, topic, qos_overriding_options)
         subscription = Subscription(
-            reader,
+            cast("Node", self),
             msg_type,
             topic,
-            full,
             callback,
             callback_group or self._default_callback_group,
             profile,
             raw,
             event_callbacks=event_callbacks or SubscriptionEventCallbacks(),
-            logger_name=self._logger.name,
         )
         self._waitables.extend(subscription.event_handlers)
         return self._keep(subscription, self._subscriptions)
@@ -321,37 +314,20 @@ class EntityHolder:
                 timer.on_clock_jump()
         self._wake_executor()
 
-    def _drop_events(self, entity: Any) -> None:
-        for handler in entity.event_handlers:
-            if handler in self._waitables:
-                self._waitables.remove(handler)
-
     def destroy_publisher(self, publisher: Publisher) -> bool:
         """Destroy a publisher; False when it is not of this node."""
-        if publisher not in self._publishers:
-            return False
-        self._publishers.remove(publisher)
-        self._drop_events(publisher)
-        self._announce(writer=publisher._endpoint, remove=True)
-        publisher.destroy()
-        self._wake_executor()
-        return True
+        return self._destroy(publisher, self._publishers)
 
     def destroy_subscription(self, subscription: Subscription) -> bool:
         """Destroy a subscription; False when it is not of this node."""
-        if subscription not in self._subscriptions:
-            return False
-        self._subscriptions.remove(subscription)
-        self._drop_events(subscription)
-        self._announce(reader=subscription._endpoint, remove=True)
-        subscription.destroy()
-        self._wake_executor()
-        return True
+        return self._destroy(subscription, self._subscriptions)
 
     def _destroy(self, entity: Any, known: list[Any]) -> bool:
         if entity not in known:
             return False
         known.remove(entity)
+        handlers = getattr(entity, "event_handlers", ())
+        self._waitables = [waitable for waitable in self._waitables if waitable not in handlers]
         entity.destroy()
         self._wake_executor()
         return True

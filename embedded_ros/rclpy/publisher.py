@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from embedded_ros.interfaces.registry import registry
 from embedded_ros.transport import INFINITE, Writer
@@ -13,28 +13,29 @@ from .duration import Duration
 from .event_handler import PublisherEventCallbacks
 from .qos import QoSProfile
 
+if TYPE_CHECKING:
+    from .node import Node
+
 
 class Publisher(Destroyable):
     """Sends messages on a topic. Made by :meth:`rclpy.node.Node.create_publisher`."""
 
     def __init__(
         self,
-        writer: Writer,
+        node: Node,
         msg_type: Any,
         topic: str,
-        full_topic: str,
         qos_profile: QoSProfile,
         event_callbacks: PublisherEventCallbacks,
         callback_group: Any,
-        logger_name: str,
     ) -> None:
-        self._endpoint = writer
+        self._node = node
+        self._full_topic = node._full_name(topic)
+        self._endpoint: Writer = node._open(msg_type, self._full_topic, qos_profile, writer=True)
         self._serialize = registry.serializer(msg_type)
-        self._full_topic = full_topic
         self.msg_type = msg_type
         self.topic = topic
         self.qos_profile = qos_profile
-        self.logger_name = logger_name
         self.event_handlers = event_callbacks.create_event_handlers(callback_group, self, topic)
 
     def publish(self, msg: Any) -> None:
@@ -74,5 +75,7 @@ class Publisher(Destroyable):
         """Leave the topic; use :meth:`rclpy.node.Node.destroy_publisher`."""
         for handler in self.event_handlers:
             handler.destroy()
-        super().destroy()
-        self._endpoint.close()
+        if not self._destroyed:
+            super().destroy()
+            self._node._announce(writer=self._endpoint, remove=True)
+            self._endpoint.close()

@@ -6,15 +6,17 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable
 from enum import Enum
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from embedded_ros.interfaces.registry import registry
 from embedded_ros.transport import Reader, Sample
 
 from .event_handler import SubscriptionEventCallbacks
 from .impl.queued import QueuedEntity, Work, await_or_execute
-from .logging import get_logger
 from .qos import HistoryPolicy, QoSProfile
+
+if TYPE_CHECKING:
+    from .node import Node
 
 
 def _takes(callback: Callable[..., Any], count: int) -> bool:
@@ -36,28 +38,27 @@ class Subscription(QueuedEntity):
 
     def __init__(
         self,
-        reader: Reader,
+        node: Node,
         msg_type: Any,
         topic: str,
-        full_topic: str,
         callback: Callable[..., Any],
         callback_group: Any,
         qos_profile: QoSProfile,
         raw: bool,
         event_callbacks: SubscriptionEventCallbacks,
-        logger_name: str,
     ) -> None:
+        self.callback = callback
+        self._node = node
+        self._full_topic = node._full_name(topic)
+        reader: Reader = node._open(msg_type, self._full_topic, qos_profile, writer=False)
         keep_all = qos_profile.history == HistoryPolicy.KEEP_ALL
         super().__init__(reader, None if keep_all else max(qos_profile.depth, 1))
         self._deserialize = registry.deserializer(msg_type)
-        self._full_topic = full_topic
         self.msg_type = msg_type
         self.topic = topic
-        self.callback = callback
         self.callback_group = callback_group
         self.qos_profile = qos_profile
         self.raw = raw
-        self.logger_name = logger_name
         self.event_handlers = event_callbacks.create_event_handlers(callback_group, self, topic)
 
     @property
@@ -109,7 +110,7 @@ class Subscription(QueuedEntity):
             return self._deserialize(sample.payload), info
         except Exception as error:
             # Whatever comes over the wire must not end the program.
-            get_logger(self.logger_name).error(
+            self._node.get_logger().error(
                 f"dropped a message on '{self._full_topic}' that cannot be read: {error}"
             )
             return None
@@ -128,4 +129,6 @@ class Subscription(QueuedEntity):
         """Leave the topic; use :meth:`rclpy.node.Node.destroy_subscription`."""
         for handler in self.event_handlers:
             handler.destroy()
-        super().destroy()
+        if not self._destroyed:
+            self._node._announce(reader=self._endpoint, remove=True)
+            super().destroy()

@@ -137,7 +137,7 @@ class Rate:
         self.destroy()
 
     def destroy(self) -> None:
-        """Wake all sleepers, who then raise."""
+        """Wake all sleepers."""
         self._is_destroyed = True
         with self._condition:
             self._condition.notify_all()
@@ -148,14 +148,14 @@ class Rate:
         :raises ROSInterruptException: the context was shut down.
         :raises RuntimeError: the rate was destroyed.
         """
+        if self._is_destroyed and not self._is_shutdown:
+            raise RuntimeError("Rate cannot sleep because it has been destroyed")
         with self._condition:
             fired = self._fired
             while True:
                 if self._is_shutdown or not self._timer._context.ok():
                     raise ROSInterruptException()
-                if self._is_destroyed:
-                    raise RuntimeError("Rate cannot sleep because it has been destroyed")
-                if self._fired != fired:
+                if self._is_destroyed or self._fired != fired:
                     return
                 # A signal ends the context without a callback: look up now and then.
                 self._condition.wait(0.1)

@@ -284,3 +284,26 @@ def test_a_callback_may_shut_its_executor_down(node, context):
     thread.join(10)
     assert not thread.is_alive()
     assert ended == [True]
+
+
+def test_destroying_a_rate_wakes_its_sleepers(node):
+    rate = node.create_rate(0.001)
+    raised, asleep = [], threading.Event()
+
+    def sleep():
+        asleep.set()
+        try:
+            rate.sleep()
+        except RuntimeError as error:
+            raised.append(error)
+
+    thread = threading.Thread(target=sleep, daemon=True)
+    thread.start()
+    asleep.wait()
+    time.sleep(0.1)
+    node.destroy_rate(rate)
+    thread.join(10)
+    assert not thread.is_alive()
+    assert not raised
+    with pytest.raises(RuntimeError, match="destroyed"):
+        rate.sleep()

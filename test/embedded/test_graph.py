@@ -189,3 +189,14 @@ def test_transform_broadcasters(node, spin):
     assert len(moving[0].transforms) == 2
     latest = {t.child_frame_id: t.transform.translation.x for t in fixed[-1].transforms}
     assert latest == {"tip": 1.0, "other": 0.0}
+
+
+def test_what_could_not_be_made_is_not_in_the_graph(make_node, spin):
+    node, viewer = make_node("maker"), make_node("viewer")
+    with pytest.raises(RuntimeError):
+        node.create_subscription(String, "text", lambda: None, 1)
+    other = node.create_publisher(String, "other", 1)
+    assert spin(lambda: viewer.count_publishers("other") == 1, viewer)
+    assert viewer.count_subscribers("text") == 0
+    other.destroy()
+    assert spin(lambda: viewer.count_publishers("other") == 0, viewer)
