@@ -19,6 +19,7 @@ from .impl.arguments import NodeArguments, parse_arguments
 from .impl.rcutils_logger import RcutilsLogger
 from .impl.rosout import Rosout
 from .logging import get_logger
+from .logging_service import LoggingService
 from .node_entities import EntityHolder
 from .node_graph import GraphViewer
 from .node_parameters import ParameterHolder
@@ -61,6 +62,7 @@ class Node(ParameterHolder, EntityHolder, GraphViewer, Destroyable):
         :param use_global_arguments: whether the process's arguments count as well.
         :param start_parameter_services: whether others may read and set parameters.
         :param parameter_overrides: initial values that beat all others.
+        :param enable_logger_service: whether others may read and set logger levels.
         :raises NotInitializedException: the context is not initialised.
         :raises InvalidNodeNameException: the name is invalid; InvalidNamespaceException likewise.
         """
@@ -107,6 +109,8 @@ class Node(ParameterHolder, EntityHolder, GraphViewer, Destroyable):
         self._time_source.attach_clock(self._clock)
         if start_parameter_services:
             self._parameter_service = ParameterService(self)
+        if enable_logger_service:
+            self._logger_service = LoggingService(self)
 
     @staticmethod
     def _free_descriptor() -> Any:

@@ -14,6 +14,7 @@ from .callback_groups import CallbackGroup
 from .event_handler import SubscriptionEventCallbacks
 from .node import Node
 from .qos import QoSProfile, qos_profile_parameter_events
+from .qos_overriding_options import QoSOverridingOptions
 
 
 @dataclass(eq=False)
@@ -92,7 +93,7 @@ class ParameterEventHandler:
         qos_profile: QoSProfile = qos_profile_parameter_events,
         callback_group: CallbackGroup | None = None,
         event_callbacks: SubscriptionEventCallbacks | None = None,
-        qos_overriding_options: Any = None,
+        qos_overriding_options: QoSOverridingOptions | None = None,
         raw: bool = False,
     ) -> None:
         """Subscribe through `node`, with the arguments of a subscription."""

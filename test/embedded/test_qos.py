@@ -4,7 +4,6 @@
 import pytest
 from rclpy.duration import Duration
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
-from rclpy.parameter import Parameter
 from rclpy.qos import (
     DurabilityPolicy,
     HistoryPolicy,
@@ -14,11 +13,6 @@ from rclpy.qos import (
     QoSProfile,
     ReliabilityPolicy,
     qos_profile_sensor_data,
-)
-from rclpy.qos_overriding_options import (
-    InvalidQosOverridesError,
-    QosCallbackResult,
-    QoSOverridingOptions,
 )
 from std_msgs.msg import Float64, String
 
@@ -45,56 +39,6 @@ def test_profiles_survive_a_dictionary(profile):
     policies = profile.get_c_qos_profile().to_dict()
     assert set(policies) == {slot[1:] for slot in QoSProfile.__slots__}
     assert QoSProfile(**policies) == profile
-
-
-def test_parameters_override_what_the_options_name(make_node):
-    overrides = {"depth": 4, "reliability": "best_effort", "durability": "transient_local"}
-    node = make_node(
-        parameter_overrides=[
-            Parameter(f"qos_overrides./text.publisher.{name}", value=value)
-            for name, value in overrides.items()
-        ]
-    )
-    publisher = node.create_publisher(
-        String, "text", 10, qos_overriding_options=QoSOverridingOptions.with_default_policies()
-    )
-    assert publisher.qos_profile == QoSProfile(depth=4, reliability=ReliabilityPolicy.BEST_EFFORT)
-    declared = node.get_parameters_by_prefix("qos_overrides./text.publisher")
-    assert {name: parameter.value for name, parameter in declared.items()} == {
-        "history": "keep_last",
-        "depth": 4,
-        "reliability": "best_effort",
-    }
-    [result] = node.set_parameters([Parameter("qos_overrides./text.publisher.depth", value=5)])
-    assert not result.successful
-
-
-def test_overrides_of_a_subscription_with_an_id(make_node):
-    prefix = "qos_overrides./text.subscription_second"
-    node = make_node(parameter_overrides=[Parameter(f"{prefix}.deadline", value=5_000_000_000)])
-    kinds = [QoSPolicyKind.DEADLINE, QoSPolicyKind.LIFESPAN]
-    subscription = node.create_subscription(
-        String,
-        "text",
-        print,
-        QoSProfile(depth=1),
-        qos_overriding_options=QoSOverridingOptions(kinds, entity_id="second"),
-    )
-    assert subscription.qos_profile.deadline == Duration(seconds=5)
-    assert not node.has_parameter(f"{prefix}.lifespan")  # a subscription has none
-
-
-def test_bad_overrides_are_refused(make_node):
-    options = QoSOverridingOptions.with_default_policies()
-    name = "qos_overrides./text.publisher.reliability"
-    node = make_node(parameter_overrides=[Parameter(name, value="sometimes")])
-    with pytest.raises(RuntimeError, match="sometimes"):
-        node.create_publisher(String, "text", 10, qos_overriding_options=options)
-    options = QoSOverridingOptions.with_default_policies(
-        callback=lambda qos: QosCallbackResult(successful=qos.depth > 10, reason="too shallow")
-    )
-    with pytest.raises(InvalidQosOverridesError, match="too shallow"):
-        node.create_publisher(String, "other", 10, qos_overriding_options=options)
 
 
 def test_matched_events_count_peers(node, spin):
