@@ -8,7 +8,7 @@ from __future__ import annotations
 import logging
 import threading
 from collections.abc import Callable
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -132,14 +132,13 @@ class Registry:
     def _definitions(self, name: str) -> list[tuple[str, Callable[[], list[MessageSpec]]]]:
         """What defines an interface, the one that counts first: where it is, how to read it."""
         found: list[tuple[str, Callable[[], list[MessageSpec]]]] = [
-            (str(path), lambda path=path: _parse(_read(path), name, str(path)))  # type: ignore[misc]
-            for path in self._files.get(name, ())
+            (str(path), partial(_parse_file, path, name)) for path in self._files.get(name, ())
         ]
         built_in = f"{name} (built in)"
         if name in standard.TEXTS:
-            found.append((built_in, lambda: _parse(standard.TEXTS[name], name, built_in)))
+            found.append((built_in, partial(_parse, standard.TEXTS[name], name, built_in)))
         elif name in self._store.fielddefs:
-            found.append((built_in, lambda: [self._from_store(name)]))
+            found.append((built_in, partial(self._from_store, name)))
         return found
 
     def _require(self, name: str, user: str) -> None:
@@ -154,7 +153,7 @@ class Registry:
                 lacking = f"the package {package} is on no search path"
             raise DefinitionError(f"{user} is of type {name}, but {lacking}") from None
 
-    def _from_store(self, name: str) -> MessageSpec:
+    def _from_store(self, name: str) -> list[MessageSpec]:
         constants, fields = self._store.fielddefs[name]
         defaults = standard.DEFAULTS.get(name, {})
         members = tuple(
@@ -166,7 +165,7 @@ class Registry:
             Constant(constant, FieldType(base), bytes([value]) if base == "byte" else value)
             for constant, base, value in constants
         )
-        return MessageSpec(name, members, values)
+        return [MessageSpec(name, members, values)]
 
     def message_class(self, name: str) -> type[Message]:
         """The class of a message, or of a message that is part of a service or action.
@@ -216,6 +215,10 @@ def _read(path: Path) -> str:
         return path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise DefinitionError(f"{path}: {error}") from error
+
+
+def _parse_file(path: Path, name: str) -> list[MessageSpec]:
+    return _parse(_read(path), name, str(path))
 
 
 def _parse(text: str, name: str, source: str) -> list[MessageSpec]:
