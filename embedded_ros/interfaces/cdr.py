@@ -58,10 +58,11 @@ def make_deserializer(
     def run(data: bytes) -> Any:
         if len(data) < 4:
             raise short(4, len(data))
-        little = data[1] & 1
-        function = functions.get(little)
+        function = functions.get(data[1])
         if function is None:
-            function = functions[little] = build("<" if little else ">")
+            if data[1] > 1:
+                raise CdrError(f"{spec.name}: encoding {data[1]} is not plain CDR (0 or 1)")
+            function = functions[data[1]] = build("<" if data[1] else ">")
         try:
             return function(data, len(data))
         except (struct.error, UnicodeDecodeError, MemoryError, OverflowError) as error:

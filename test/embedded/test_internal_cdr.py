@@ -108,6 +108,11 @@ def test_wide_characters_take_four_bytes():
         deserialize_message(expected[:8] + b"\0\0\1\0" + expected[12:], WString)
 
 
+def test_other_encodings_are_refused():
+    with pytest.raises(RMWError, match="encoding 7"):
+        deserialize_message(b"\0\7" + serialize_message(Part())[2:], Part)
+
+
 def test_special_floats():
     part = deserialize_message(serialize_message(Part(value=math.inf)), Part)
     assert part.value == math.inf
