@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What code imports from rclpy's compiled module: mostly error classes."""
+"""What code imports from rclpy's compiled module: error classes, and what waitables are made of."""
 
 from __future__ import annotations
 
@@ -41,10 +41,20 @@ def __getattr__(name: str) -> Any:
     """Classes of this runtime that rclpy has in its compiled module."""
     if name not in _ELSEWHERE:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(importlib.import_module(_ELSEWHERE[name], __package__), name)
+    module, _, attribute = _ELSEWHERE[name].rpartition(".")
+    return getattr(importlib.import_module(module, __package__), attribute)
 
 
-_ELSEWHERE = {"EventHandle": ".event_handler", "rmw_qos_profile_t": ".qos"}
+_ELSEWHERE = {
+    "Client": ".impl.wait_set.make_client",
+    "EventHandle": ".event_handler.EventHandle",
+    "GuardCondition": ".impl.wait_set.make_guard_condition",
+    "Service": ".impl.wait_set.make_service",
+    "Subscription": ".impl.wait_set.make_subscription",
+    "Timer": ".impl.wait_set.make_timer",
+    "WaitSet": ".impl.wait_set.WaitSet",
+    "rmw_qos_profile_t": ".qos.rmw_qos_profile_t",
+}
 
 __all__ = [
     "InvalidArgument",

@@ -81,6 +81,19 @@ class Client(ServiceEnd):
         self._tell(ServiceEventInfo.REQUEST_SENT, request_id, request)
         return future
 
+    def send_request(self, request: Any) -> int:
+        """Call the service without a future: :meth:`take_response` gets what comes. The number of
+        the request.
+        """
+        request_id = rmw_request_id_t(self._writer.handle, next(self._numbers))
+        self.handle._send(request_id, request)
+        return request_id.sequence_number
+
+    def take_response(self, response_type: Any = None) -> tuple[Any, Any] | None:
+        """Take the oldest response, with its header before it, or None when there is none."""
+        self.drain()
+        return self._read(self._queue.popleft()) if self._queue else None
+
     def get_pending_request(self, sequence_number: int) -> Future:
         """The future of a request that was not answered yet.
 
@@ -105,6 +118,8 @@ class Client(ServiceEnd):
             # Servers of other middlewares announce no identity.
             return bool(readers and writers)
         return bool(servers & self._peer_ids(writers, "serviceid"))
+
+    service_server_is_available = service_is_ready
 
     def wait_for_service(self, timeout_sec: float | None = None) -> bool:
         """Wait for a server; False when there is none in time."""

@@ -199,7 +199,7 @@ class Executor:
         handle = timer.handle
         if handle.is_canceled() or timer.callback is None:
             return None
-        handle.begin_call()
+        handle.call_timer()
         return lambda: await_or_execute(timer.callback)
 
     @staticmethod
@@ -223,12 +223,13 @@ class Executor:
         """Claim and yield what is ready now, at most one callback per entity: events, then node by
         node timers, messages and guard conditions.
         """
-        waitables = entities.waitables
+        waitables = entities.asked
+        entities.wait_set.look()
         if (now := time.monotonic()) >= self._next_poll:
             self._next_poll = now + POLL_PERIOD
             waitables = entities.events + waitables
         for waitable, node in waitables:
-            if self.can_execute(waitable) and waitable.is_ready(None):
+            if self.can_execute(waitable) and waitable.is_ready(entities.wait_set):
                 yield self._claim(waitable, node, lambda w=waitable: self._take_waitable(w))  # type: ignore[misc]
         for place in entities.candidates():
             entity, node = entities.others[place]
@@ -259,8 +260,8 @@ class Executor:
     def _next_timer(self, entities: Entities) -> int | None:
         """Nanoseconds until the next timer that may run, or None."""
         soonest = None
-        for timer in entities.timers:
-            if timer._destroyed or not self.can_execute(timer):
+        for timer in entities.timers + entities.wait_set.members("timer"):
+            if timer._destroyed or (timer.callback_group and not self.can_execute(timer)):
                 continue
             left = timer.time_until_next_call()
             if left is not None and (soonest is None or left < soonest):
@@ -271,9 +272,7 @@ class Executor:
         waiter = self._waiter
         if waiter is None:
             return
-        if entities.waiter is not waiter:
-            entities.waiter = waiter
-            waiter.set_readers(set(entities.readers))
+        entities.set_readers(waiter)
         for reader in waiter.wait(timeout):
             place = entities.readers.get(reader)
             if place is not None:
@@ -302,8 +301,11 @@ class Executor:
                 found = True
                 yield item
             entities = self._gather(used)
+            entities.fill_wait_set(self.can_execute, self._progress)
             wait = self._next_timer(entities)
-            if any(e.has_work() and self.can_execute(e) for e in entities.waiting()):
+            if any(e.has_work() and self.can_execute(e) for e in entities.waiting()) or any(
+                member.has_work() for member in entities.wait_set.queued()
+            ):
                 wait = 0
             if end is not None:
                 left = max(end - time.monotonic_ns(), 0)

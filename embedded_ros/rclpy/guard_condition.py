@@ -31,3 +31,5 @@ class GuardCondition(Destroyable):
         self.handle._executor_triggered = True
         if self._wake is not None:
             self._wake()
+
+    trigger_guard_condition = trigger

@@ -91,6 +91,8 @@ class Service(ServiceEnd):
         self.handle._send(request_id, response)
         self._tell(ServiceEventInfo.RESPONSE_SENT, request_id, response)
 
+    service_send_response = send_response
+
     def _client_listens(self, writer: int) -> bool:
         """Wait a little for the client's reader: it may be found after its writer."""
         end = time.monotonic() + _CLIENT_LIMIT

@@ -91,7 +91,7 @@ class Timer(Destroyable):
         """Nanoseconds until the next call, negative when overdue, None when canceled."""
         return None if self.handle._canceled else self._next_call - self._clock._now()
 
-    def begin_call(self) -> None:
+    def call_timer(self) -> None:
         """Note that the callback is being called, and find the next time: the first multiple that
         lies ahead.
         """

@@ -7,7 +7,7 @@ from typing import Any
 
 
 class NumberOfEntities:
-    """Counts kept for code written against rclpy's wait sets; this runtime does not need them."""
+    """How many entities of each kind a waitable has; wait sets of this runtime do not need it."""
 
     __slots__ = (
         "num_clients",
@@ -48,7 +48,8 @@ class NumberOfEntities:
 class Waitable:
     """Base of what :meth:`Node.add_waitable` takes.
 
-    The executor asks :meth:`is_ready`, then calls :meth:`take_data` and awaits :meth:`execute`.
+    The executor calls :meth:`add_to_wait_set` before it waits and :meth:`is_ready` afterwards, and
+    if so :meth:`take_data` and :meth:`execute`.
     """
 
     def __init__(self, callback_group: Any) -> None:
@@ -79,8 +80,10 @@ class Waitable:
         raise NotImplementedError("Must be implemented by subclass")
 
     def get_num_entities(self) -> NumberOfEntities:
-        """Not used by this runtime's executors."""
+        """How many entities :meth:`add_to_wait_set` adds; not used by executors of this runtime."""
         return NumberOfEntities()
 
     def add_to_wait_set(self, wait_set: Any) -> None:
-        """Not used by this runtime's executors."""
+        """Add what to wait for: ``wait_set.add_subscription(...)`` and so on give the index that
+        ``wait_set.is_ready("subscription", index)`` takes.
+        """

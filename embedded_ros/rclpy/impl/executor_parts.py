@@ -11,6 +11,7 @@ from embedded_ros.transport import Reader, Waiter
 
 from ..event_handler import EventHandler
 from ..timer import Timer
+from .wait_set import WaitSet
 
 if TYPE_CHECKING:
     from ..node import Node
@@ -82,6 +83,9 @@ class Entities:
         #: looked at now and then only
         self.events = [pair for pair in waitables if isinstance(pair[0], EventHandler)]
         self.waitables = [pair for pair in waitables if not isinstance(pair[0], EventHandler)]
+        self.asked: list[tuple[Any, Node]] = []
+        self.wait_set = WaitSet()
+        self.foreign_readers: set[Reader] = set()
         #: all but waitables
         self.others: list[tuple[Any, Node]] = []
         self.readers: dict[Reader, int] = {}
@@ -100,10 +104,26 @@ class Entities:
                     self.queued.add(place)
         self.timers = [entity for entity, _ in self.others if isinstance(entity, Timer)]
 
+    def fill_wait_set(self, can_execute: Callable[[Any], bool], wake: Callable[[], None]) -> None:
+        """Ask the waitables that may run what to wait for."""
+        self.wait_set.clear_entities()
+        self.asked = [pair for pair in self.waitables if can_execute(pair[0])]
+        for waitable, _ in self.asked:
+            waitable.add_to_wait_set(self.wait_set)
+        for guard in self.wait_set.members("guard_condition"):
+            guard._wake = wake
+
     def waiting(self) -> list[Any]:
         """The entities that have messages."""
         self.queued = {place for place in self.queued if self.others[place][0].has_work()}
         return [self.others[place][0] for place in self.queued]
+
+    def set_readers(self, waiter: Waiter) -> None:
+        """Have the waiter wait for what is here."""
+        foreign = {member.reader for member in self.wait_set.queued()} - {None}
+        if self.waiter is not waiter or self.foreign_readers != foreign:
+            self.waiter, self.foreign_readers = waiter, foreign
+            waiter.set_readers(foreign.union(self.readers))
 
     def candidates(self) -> list[int]:
         """The places of what may be ready."""

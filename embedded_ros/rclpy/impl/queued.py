@@ -42,6 +42,11 @@ class QueuedEntity(Destroyable):
         """Fetch what has arrived."""
         self._queue.extend(self._endpoint.take(256))
 
+    def is_ready(self) -> bool:
+        """Whether something has arrived, for a wait set."""
+        self.drain()
+        return bool(self._queue)
+
     def has_work(self) -> bool:
         """Whether something waits to be taken."""
         return bool(self._queue)
