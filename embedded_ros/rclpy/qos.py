@@ -4,7 +4,9 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 from enum import Enum, IntEnum
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 from embedded_ros.transport import INFINITE, Qos
@@ -106,38 +108,34 @@ QoSLivelinessPolicy = LivelinessPolicy
 DeadlineBestAvailable = Duration(nanoseconds=2**63 - 2)
 LivelinessLeaseDurationeBestAvailable = Duration(nanoseconds=2**63 - 2)
 
-_UNSPECIFIED = Duration()
-
 
 def _check(condition: bool, text: str) -> None:
     if not condition:
         raise AssertionError(text)
 
 
-def _enum_property(name: str, kind: type[QoSPolicyEnum]) -> Any:
+def _policy(name: str, kind: type, convert: Callable[[Any], Any] = lambda value: value) -> Any:
+    """The property of a policy, which takes values of `kind`."""
     slot = "_" + name
 
-    def get(self: Any) -> Any:
-        return getattr(self, slot)
-
     def put(self: Any, value: Any) -> None:
-        _check(isinstance(value, (kind, int)), f"{name} must be a {kind.__name__}, got {value!r}")
-        setattr(self, slot, kind(value))
+        _check(isinstance(value, kind), f"{name} must be of type {kind.__name__}, got {value!r}")
+        setattr(self, slot, convert(value))
 
-    return property(get, put, doc=f"The {name} policy.")
+    return property(attrgetter(slot), put, doc=f"The {name} policy.")
 
 
-def _duration_property(name: str) -> Any:
-    slot = "_" + name
-
-    def get(self: Any) -> Any:
-        return getattr(self, slot)
-
-    def put(self: Any, value: Any) -> None:
-        _check(isinstance(value, Duration), f"{name} must be a Duration, got {value!r}")
-        setattr(self, slot, value)
-
-    return property(get, put, doc=f"The {name}; zero: not specified.")
+#: what a profile says when its maker does not; durations of zero are not specified
+_DEFAULTS: dict[str, Any] = {
+    "depth": 10,
+    "reliability": ReliabilityPolicy.RELIABLE,
+    "durability": DurabilityPolicy.VOLATILE,
+    "lifespan": Duration(),
+    "deadline": Duration(),
+    "liveliness": LivelinessPolicy.SYSTEM_DEFAULT,
+    "liveliness_lease_duration": Duration(),
+    "avoid_ros_namespace_conventions": False,
+}
 
 
 class QoSProfile:
@@ -170,22 +168,17 @@ class QoSProfile:
         self.history = kwargs["history"]
         if self.history == HistoryPolicy.KEEP_LAST and "depth" not in kwargs:
             raise InvalidQoSProfileException("History set to KEEP_LAST without a depth setting.")
-        self.depth = kwargs.get("depth", 10)
-        self.reliability = kwargs.get("reliability", ReliabilityPolicy.RELIABLE)
-        self.durability = kwargs.get("durability", DurabilityPolicy.VOLATILE)
-        self.lifespan = kwargs.get("lifespan", _UNSPECIFIED)
-        self.deadline = kwargs.get("deadline", _UNSPECIFIED)
-        self.liveliness = kwargs.get("liveliness", LivelinessPolicy.SYSTEM_DEFAULT)
-        self.liveliness_lease_duration = kwargs.get("liveliness_lease_duration", _UNSPECIFIED)
-        self.avoid_ros_namespace_conventions = kwargs.get("avoid_ros_namespace_conventions", False)
+        for name, default in _DEFAULTS.items():
+            setattr(self, name, kwargs.get(name, default))
 
-    history = _enum_property("history", HistoryPolicy)
-    reliability = _enum_property("reliability", ReliabilityPolicy)
-    durability = _enum_property("durability", DurabilityPolicy)
-    liveliness = _enum_property("liveliness", LivelinessPolicy)
-    lifespan = _duration_property("lifespan")
-    deadline = _duration_property("deadline")
-    liveliness_lease_duration = _duration_property("liveliness_lease_duration")
+    history = _policy("history", int, HistoryPolicy)
+    reliability = _policy("reliability", int, ReliabilityPolicy)
+    durability = _policy("durability", int, DurabilityPolicy)
+    liveliness = _policy("liveliness", int, LivelinessPolicy)
+    lifespan = _policy("lifespan", Duration)
+    deadline = _policy("deadline", Duration)
+    liveliness_lease_duration = _policy("liveliness_lease_duration", Duration)
+    avoid_ros_namespace_conventions = _policy("avoid_ros_namespace_conventions", bool)
 
     @property
     def depth(self) -> int:
@@ -202,19 +195,6 @@ class QoSProfile:
                 stacklevel=3,
             )
         self._depth = value
-
-    @property
-    def avoid_ros_namespace_conventions(self) -> bool:
-        """Whether topic names go to the middleware as they are."""
-        return self._avoid_ros_namespace_conventions
-
-    @avoid_ros_namespace_conventions.setter
-    def avoid_ros_namespace_conventions(self, value: bool) -> None:
-        _check(
-            isinstance(value, bool),
-            f"avoid_ros_namespace_conventions must be a bool, got {value!r}",
-        )
-        self._avoid_ros_namespace_conventions = value
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, QoSProfile):
@@ -311,30 +291,24 @@ def _duration(nanoseconds: int) -> Duration:
     return Infinite if nanoseconds >= INFINITE else Duration(nanoseconds=nanoseconds)
 
 
-_DEFAULTS: dict[str, Any] = {"history": HistoryPolicy.KEEP_LAST}
-_SYSTEM: dict[str, Any] = {
-    "history": HistoryPolicy.SYSTEM_DEFAULT,
-    "depth": 0,
-    "reliability": ReliabilityPolicy.SYSTEM_DEFAULT,
-    "durability": DurabilityPolicy.SYSTEM_DEFAULT,
-}
-_UNKNOWN: dict[str, Any] = {
-    "history": HistoryPolicy.UNKNOWN,
-    "depth": 0,
-    "reliability": ReliabilityPolicy.UNKNOWN,
-    "durability": DurabilityPolicy.UNKNOWN,
-    "liveliness": LivelinessPolicy.UNKNOWN,
-}
-
-qos_profile_unknown = QoSProfile(**_UNKNOWN)
-qos_profile_default = QoSProfile(depth=10, **_DEFAULTS)
-qos_profile_system_default = QoSProfile(**_SYSTEM)
-qos_profile_sensor_data = QoSProfile(
-    depth=5, reliability=ReliabilityPolicy.BEST_EFFORT, **_DEFAULTS
+qos_profile_unknown = QoSProfile(
+    history=HistoryPolicy.UNKNOWN,
+    depth=0,
+    reliability=ReliabilityPolicy.UNKNOWN,
+    durability=DurabilityPolicy.UNKNOWN,
+    liveliness=LivelinessPolicy.UNKNOWN,
 )
-qos_profile_services_default = QoSProfile(depth=10, **_DEFAULTS)
-qos_profile_parameters = QoSProfile(depth=1000, **_DEFAULTS)
-qos_profile_parameter_events = QoSProfile(depth=1000, **_DEFAULTS)
+qos_profile_default = QoSProfile(depth=10)
+qos_profile_system_default = QoSProfile(
+    history=HistoryPolicy.SYSTEM_DEFAULT,
+    depth=0,
+    reliability=ReliabilityPolicy.SYSTEM_DEFAULT,
+    durability=DurabilityPolicy.SYSTEM_DEFAULT,
+)
+qos_profile_sensor_data = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
+qos_profile_services_default = QoSProfile(depth=10)
+qos_profile_parameters = QoSProfile(depth=1000)
+qos_profile_parameter_events = QoSProfile(depth=1000)
 qos_profile_best_available = QoSProfile(
     depth=10,
     reliability=ReliabilityPolicy.BEST_AVAILABLE,
@@ -342,11 +316,8 @@ qos_profile_best_available = QoSProfile(
     liveliness=LivelinessPolicy.BEST_AVAILABLE,
     deadline=DeadlineBestAvailable,
     liveliness_lease_duration=LivelinessLeaseDurationeBestAvailable,
-    **_DEFAULTS,
 )
-qos_profile_action_status_default = QoSProfile(
-    depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL, **_DEFAULTS
-)
+qos_profile_action_status_default = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class QoSPresetProfiles(Enum):
@@ -381,47 +352,33 @@ class QoSCompatibility(IntEnum):
     ERROR = 2
 
 
+_LAX_AND_STRICT = {
+    "reliability": (ReliabilityPolicy.BEST_EFFORT, ReliabilityPolicy.RELIABLE),
+    "durability": (DurabilityPolicy.VOLATILE, DurabilityPolicy.TRANSIENT_LOCAL),
+    "liveliness": (LivelinessPolicy.AUTOMATIC, LivelinessPolicy.MANUAL_BY_TOPIC),
+}
+
+
 def qos_check_compatible(
     publisher_qos: QoSProfile, subscription_qos: QoSProfile
 ) -> tuple[QoSCompatibility, str]:
-    """Whether a publisher and a subscription with these profiles can talk, and why not."""
-    pub, sub = publisher_qos, subscription_qos
-    errors = []
-    if (
-        pub.reliability == ReliabilityPolicy.BEST_EFFORT
-        and sub.reliability == ReliabilityPolicy.RELIABLE
-    ):
-        errors.append("ERROR: Best effort publisher and reliable subscription;")
-    if (
-        pub.durability == DurabilityPolicy.VOLATILE
-        and sub.durability == DurabilityPolicy.TRANSIENT_LOCAL
-    ):
-        errors.append("ERROR: Volatile publisher and transient local subscription;")
-    if _nanoseconds(pub.deadline) > _nanoseconds(sub.deadline):
-        errors.append(
-            "ERROR: Subscription expects messages more often than the publisher's deadline;"
-        )
-    if (
-        pub.liveliness == LivelinessPolicy.AUTOMATIC
-        and sub.liveliness == LivelinessPolicy.MANUAL_BY_TOPIC
-    ):
-        errors.append(
-            "ERROR: Publisher's liveliness is automatic and subscription's is manual by topic;"
-        )
-    if _nanoseconds(pub.liveliness_lease_duration) > _nanoseconds(sub.liveliness_lease_duration):
-        errors.append(
-            "ERROR: Subscription's liveliness lease duration is less than the publisher's;"
-        )
+    """Whether a publisher and a subscription with these profiles can talk, and why not.
+
+    The answer is WARNING where a policy that matters is left to the middleware.
+    """
+    errors, doubts = "", ""
+    for name, (lax, strict) in _LAX_AND_STRICT.items():
+        pub, sub = getattr(publisher_qos, name), getattr(subscription_qos, name)
+        pub_open, sub_open = (p.name in ("SYSTEM_DEFAULT", "UNKNOWN") for p in (pub, sub))
+        text = f"{name} of the publisher is {pub.short_key}, of the subscription {sub.short_key};"
+        if (pub, sub) == (lax, strict):
+            errors += "ERROR: " + text
+        elif (pub_open or pub == lax) and (sub_open or sub == strict):
+            doubts += "WARNING: " + text
+    for name in ("deadline", "liveliness_lease_duration"):
+        pub, sub = getattr(publisher_qos, name), getattr(subscription_qos, name)
+        if _nanoseconds(pub) > _nanoseconds(sub):
+            errors += f"ERROR: {name} of the publisher is {pub}, of the subscription {sub};"
     if errors:
-        return QoSCompatibility.ERROR, "".join(errors)
-    open_values = {"SYSTEM_DEFAULT", "UNKNOWN"}
-    policies = [(p.reliability.name, p.durability.name) for p in (pub, sub)]
-    warning = [
-        name
-        for name, index in (("reliability", 0), ("durability", 1))
-        if any(p[index] in open_values for p in policies)
-    ]
-    if warning:
-        text = "".join(f"WARNING: {name} of a profile is not decided;" for name in warning)
-        return QoSCompatibility.WARNING, text
-    return QoSCompatibility.OK, ""
+        return QoSCompatibility.ERROR, errors
+    return (QoSCompatibility.WARNING if doubts else QoSCompatibility.OK), doubts

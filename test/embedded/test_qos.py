@@ -12,6 +12,7 @@ from rclpy.qos import (
     QoSPresetProfiles,
     QoSProfile,
     ReliabilityPolicy,
+    qos_check_compatible,
     qos_profile_sensor_data,
 )
 from std_msgs.msg import Float64, String
@@ -39,6 +40,34 @@ def test_profiles_survive_a_dictionary(profile):
     policies = profile.get_c_qos_profile().to_dict()
     assert set(policies) == {slot[1:] for slot in QoSProfile.__slots__}
     assert QoSProfile(**policies) == profile
+
+
+DECIDED = {"depth": 1, "liveliness": LivelinessPolicy.AUTOMATIC}
+
+
+@pytest.mark.parametrize(
+    ("publisher", "subscription", "expected"),
+    [
+        ({}, {}, "OK"),
+        ({"reliability": ReliabilityPolicy.BEST_EFFORT}, {}, "ERROR"),
+        ({}, {"durability": DurabilityPolicy.TRANSIENT_LOCAL}, "ERROR"),
+        ({}, {"liveliness": LivelinessPolicy.MANUAL_BY_TOPIC}, "ERROR"),
+        ({}, {"deadline": Duration(seconds=1)}, "ERROR"),
+        ({"deadline": Duration(seconds=1)}, {}, "OK"),
+        ({"deadline": Duration(seconds=2)}, {"deadline": Duration(seconds=1)}, "ERROR"),
+        ({}, {"liveliness_lease_duration": Duration(seconds=1)}, "ERROR"),
+        ({"reliability": ReliabilityPolicy.SYSTEM_DEFAULT}, {}, "WARNING"),
+        ({}, {"reliability": ReliabilityPolicy.SYSTEM_DEFAULT}, "OK"),
+        ({"durability": DurabilityPolicy.SYSTEM_DEFAULT}, {}, "OK"),
+        ({}, {"durability": DurabilityPolicy.UNKNOWN}, "WARNING"),
+        ({}, {"liveliness": LivelinessPolicy.SYSTEM_DEFAULT}, "WARNING"),
+    ],
+)
+def test_compatibility_is_judged_before_anything_is_made(publisher, subscription, expected):
+    profiles = [QoSProfile(**{**DECIDED, **policies}) for policies in (publisher, subscription)]
+    compatibility, reason = qos_check_compatible(*profiles)
+    assert compatibility.name == expected
+    assert bool(reason) == (expected != "OK")
 
 
 def test_matched_events_count_peers(node, spin):
