@@ -2,13 +2,15 @@
 """Type and range checks on assignment to message members.
 
 They raise what the checks of rosidl's generated Python classes raise, AssertionError, so that code
-behaves the same here and on ROS 2 with ROS_PYTHON_CHECK_FIELDS=1. They are always on.
+behaves the same here and on ROS 2 with ROS_PYTHON_CHECK_FIELDS=1. Unlike there they are on unless
+ROS_PYTHON_CHECK_FIELDS is 0; those of numeric collections, which are converted, always are.
 """
 
 from __future__ import annotations
 
 import array
 import math
+import os
 from collections import UserList, UserString
 from collections.abc import Callable, Iterable, Sequence, Set
 from typing import Any
@@ -150,7 +152,10 @@ def _collection_check(ftype: FieldType, classes: Classes) -> Check:
 
 def field_check(ftype: FieldType, classes: Classes) -> Check:
     """The check for assignment to a member of type `ftype`."""
-    return (_scalar_check if ftype.kind == "scalar" else _collection_check)(ftype, classes)
+    collection = ftype.kind != "scalar"
+    if os.environ.get("ROS_PYTHON_CHECK_FIELDS") == "0" and not (collection and ftype.is_numeric):
+        return lambda value, name: value
+    return (_collection_check if collection else _scalar_check)(ftype, classes)
 
 
 def numeric_converter(ftype: FieldType) -> Check:

@@ -4,9 +4,13 @@
 import array
 import copy
 import math
+import os
 import pickle
 import re
+import subprocess
+import sys
 from collections import UserList, UserString
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -41,6 +45,8 @@ from std_msgs.msg import (
 from std_srvs.srv import SetBool, Trigger
 from tf2_msgs.action import LookupTransform
 from visualization_msgs.msg import Marker, MarkerArray
+
+ROOT = Path(__file__).resolve().parents[2]
 
 
 def test_defaults_come_from_the_definition():
@@ -339,3 +345,20 @@ def test_messages_become_bytes_and_come_back():
         deserialize_message(payload, int)
     with pytest.raises(TypeError):
         deserialize_message("text", String)
+
+
+def test_field_checks_can_be_turned_off():
+    program = (
+        "import embedded_ros; embedded_ros.enable()\n"
+        "from geometry_msgs.msg import Pose\n"
+        "from std_msgs.msg import Header\n"
+        "pose = Pose(position='here')\n"
+        "pose.orientation = 3\n"
+        "print(pose.position, pose.orientation, Header(frame_id=1).frame_id)\n"
+    )
+    path = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
+    environment = {**os.environ, "ROS_PYTHON_CHECK_FIELDS": "0", "PYTHONPATH": path}
+    done = subprocess.run(
+        [sys.executable, "-c", program], env=environment, capture_output=True, text=True
+    )
+    assert done.stdout.split() == ["here", "3", "1"], done.stderr
