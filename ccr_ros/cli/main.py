@@ -35,8 +35,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     Args:
         argv: Arguments after the program's name; ``None`` takes them from ``sys.argv``.
     """
+    words = list(sys.argv[1:] if argv is None else argv)
+    if argv is None and words[:1] == ["run"]:
+        from ccr_ros.nodes.entry import end_on_signals
+
+        end_on_signals()  # a node may be told to end while it loads
     try:
-        code = _dispatch(list(sys.argv[1:] if argv is None else argv))
+        code = _dispatch(words)
         sys.stdout.flush()  # so that a broken pipe is met here, not while exiting
         return code
     except KeyboardInterrupt:

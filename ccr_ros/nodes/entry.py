@@ -3,22 +3,35 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import sys
+
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+def end_on_signals() -> None:
+    """Have a signal end the process at once and in peace, as long as it only loads libraries.
+
+    Not by an exception: one within an import can lose the exit code.
+    """
+    for number in _SIGNALS:
+        signal.signal(number, lambda *_: os._exit(0))
 
 
 def solver_node() -> int:
     """Run the solver node; arguments are in ``sys.argv``. Returns the exit code."""
-    try:  # all imports in it, as a Ctrl-C may come while the libraries load
-        from ccr_ros.model.errors import CcrError
-        from ccr_ros.runtime import enable_ros
+    end_on_signals()
+    from ccr_ros.model.errors import CcrError
+    from ccr_ros.runtime import enable_ros
 
-        try:
-            enable_ros()
-            from ccr_ros.nodes.solver_node import main
+    try:
+        enable_ros()
+        from ccr_ros.nodes.solver_node import main
 
-            return main()
-        except CcrError as error:
-            print(f"solver_node: error: {error}", file=sys.stderr)
-            return 1
-    except KeyboardInterrupt:
-        return 0
+        for number in _SIGNALS:
+            signal.signal(number, signal.default_int_handler)  # until rclpy.init brings its own
+        return main()
+    except CcrError as error:
+        print(f"solver_node: error: {error}", file=sys.stderr)
+        return 1

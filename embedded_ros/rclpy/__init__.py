@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from ._rclpy_pybind11 import RCLError
 from .context import Context
 from .parameter import Parameter
 from .signals import SignalHandlerOptions, install_signal_handlers, uninstall_signal_handlers
@@ -66,25 +67,34 @@ _executor: Any = None
 
 
 def get_global_executor() -> Executor:
-    """The executor that the functions of this module use."""
+    """The executor that the functions of this module use.
+
+    :raises rclpy.executors.ExternalShutdownException: the default context has ended already.
+    """
     global _executor
-    if _executor is None:
-        from .executors import SingleThreadedExecutor
-
-        _executor = SingleThreadedExecutor()
-
-        def reset() -> None:
-            global _executor
-            if _executor is not None:
-                _executor.shutdown(timeout_sec=0)
-            _executor = None
-
-        get_default_context().on_shutdown(reset)
-    elif not _executor.context.ok() and get_default_context().ok():
+    context = get_default_context()
+    if _executor is not None and not _executor.context.ok() and context.ok():
         # The old context was ended by a signal, which calls no shutdown callbacks.
         _executor = None
-        return get_global_executor()
-    return _executor
+    if _executor is not None:
+        return _executor
+    from .executors import ExternalShutdownException, SingleThreadedExecutor
+
+    try:
+        executor = _executor = SingleThreadedExecutor()
+    except RCLError:
+        if context.handle is None:
+            raise
+        raise ExternalShutdownException() from None  # a signal came before spinning began
+
+    def reset() -> None:
+        global _executor
+        if _executor is not None:
+            _executor.shutdown(timeout_sec=0)
+        _executor = None
+
+    context.on_shutdown(reset)
+    return executor
 
 
 def shutdown(*, context: Context | None = None, uninstall_handlers: bool | None = None) -> None:

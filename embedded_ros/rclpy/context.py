@@ -87,7 +87,8 @@ class Context:
 
         :param args: command line, default sys.argv.
         :param domain_id: default ROS_DOMAIN_ID or 0.
-        :raises RuntimeError: the context is initialised already, or the domain is out of range.
+        :raises RuntimeError: the context is initialised already, the domain is out of range, or it
+            cannot be joined with the discovery settings of the environment.
         """
         from .impl.rcutils_logger import configure
 
@@ -101,24 +102,28 @@ class Context:
                 raise RCLError(f"domain id {domain_id} is above {_MAX_DOMAIN}")
             self._domain_id = _domain_from_environment() if domain_id is None else domain_id
             self._initialized = self._is_ok = True
+            try:
+                # Not only with the first node, so that a bad setting is an error here.
+                self._participant = open_participant(self._domain_id)
+            except Exception:
+                self._initialized = self._is_ok = False
+                raise
             if initialize_logging:
                 configure(self.arguments)
             live_contexts.add(self)
 
     @property
     def participant(self) -> Participant:
-        """The DDS participant, made on first use.
+        """The DDS participant.
 
         :raises RCLError: the context is shut down.
         """
         with self._lock:
-            if not self._is_ok:
+            if not self._is_ok or self._participant is None:
                 raise RCLError(
                     "the given context is not valid, either rcl_init() was not called or it was "
                     "shut down"
                 )
-            if self._participant is None:
-                self._participant = open_participant(self._domain_id)
             return self._participant
 
     @property

@@ -2,13 +2,16 @@
 """SIGINT and SIGTERM end all contexts, after which spinning raises or returns.
 
 The handler that was there before is called as well: for SIGINT that is Python's, which raises
-KeyboardInterrupt.
+KeyboardInterrupt. Not for a second signal within a second of the first: it means the same, and would
+only break the program's cleaning up.
 """
 
 from __future__ import annotations
 
+import atexit
 import signal
 import threading
+import time
 from enum import IntFlag
 from functools import partial
 from types import FrameType
@@ -29,12 +32,21 @@ class SignalHandlerOptions(IntFlag):
     ALL = 3
 
 
+#: how long a program that was told to end is not told again, s
+_GRACE = 1.0
+
 _previous: dict[int, Any] = {}
+_told: float | None = None
 
 
 def _handle(number: int, frame: FrameType | None) -> None:
+    global _told
     for context in list(live_contexts):
         context._invalidate()
+    now = time.monotonic()
+    if _told is not None and now - _told < _GRACE:
+        return
+    _told = now
     previous = _previous.get(number)
     if callable(previous):
         deliver(partial(previous, number, frame))
@@ -73,6 +85,16 @@ def get_current_signal_handlers_options() -> SignalHandlerOptions:
     if signal.SIGTERM in _previous:
         result |= SignalHandlerOptions.SIGTERM
     return result
+
+
+def _ignore_signals() -> None:
+    """While the interpreter ends it has no handlers any more, and a late signal would kill it."""
+    if _told is not None:
+        for number in _previous:
+            signal.signal(number, signal.SIG_IGN)
+
+
+atexit.register(_ignore_signals)
 
 
 class SignalHandlerGuardCondition(GuardCondition):

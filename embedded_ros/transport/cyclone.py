@@ -52,7 +52,7 @@ from .base import (
     Writer,
     user_data,
 )
-from .cyclone_config import domain_xml
+from .cyclone_config import domain_xml, settings_in_use
 from .cyclone_types import carrier, from_cyclone, to_cyclone
 
 SLICE = 100_000_000
@@ -100,13 +100,7 @@ def _enter_domain(domain_id: int) -> None:
         del _domains[domain_id], known
         known = None
     if known is None:
-        try:
-            _domains[domain_id] = (config, Domain(domain_id, config))
-        except DDSException as error:
-            raise RuntimeError(
-                f"cannot enter DDS domain {domain_id} with {config}: {error}"
-            ) from error
-    _participants[domain_id] = _participants.get(domain_id, 0) + 1
+        _domains[domain_id] = (config, Domain(domain_id, config))
 
 
 class _Peers:
@@ -194,7 +188,7 @@ class CycloneWriter(Writer):
         return StatusChange(status.total_count, status.total_count_change)
 
     def close(self) -> None:
-        with _lock:
+        with uninterrupted(), _lock:
             self._writer = None
             self._peers = None
 
@@ -258,7 +252,7 @@ class CycloneReader(Reader):
         return StatusChange(status.total_count, status.total_count_change)
 
     def close(self) -> None:
-        with _lock:
+        with uninterrupted(), _lock:
             for waiter in list(self._waiters):
                 waiter.detach(self)
             self.condition = None
@@ -320,7 +314,7 @@ class CycloneWaiter(Waiter):
                 guard.set(True)
 
     def close(self) -> None:
-        with _lock:
+        with uninterrupted(), _lock:
             for reader in list(self._readers.values()):
                 self.detach(reader)
             self._set = None
@@ -333,9 +327,15 @@ class CycloneParticipant(Participant):
     def __init__(self, domain_id: int) -> None:
         self.domain_id = domain_id
         with _lock:
-            _enter_domain(domain_id)
             qos = CycloneQos(Policy.Userdata(b"enclave=/;"))
-            self.participant: Any = DomainParticipant(domain_id, qos=qos)
+            try:
+                _enter_domain(domain_id)
+                self.participant: Any = DomainParticipant(domain_id, qos=qos)
+            except DDSException as error:
+                raise RuntimeError(
+                    f"cannot enter DDS domain {domain_id}{settings_in_use()}: {error}"
+                ) from error
+            _participants[domain_id] = _participants.get(domain_id, 0) + 1
             self.guid = self.participant.guid.bytes
             self.publisher: Any = Publisher(self.participant)
             self.subscriber: Any = Subscriber(self.participant)
@@ -401,7 +401,7 @@ class CycloneParticipant(Participant):
         )
 
     def close(self) -> None:
-        with _lock:
+        with uninterrupted(), _lock:
             if self.participant is None:
                 return
             self._builtin = None

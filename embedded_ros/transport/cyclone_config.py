@@ -1,30 +1,38 @@
 # SPDX-License-Identifier: Apache-2.0
 """Cyclone DDS configuration from ROS's environment variables.
 
-ROS_AUTOMATIC_DISCOVERY_RANGE (OFF, LOCALHOST, SUBNET, SYSTEM_DEFAULT), ROS_LOCALHOST_ONLY (older,
-wins when 1) and ROS_STATIC_PEERS (addresses separated by ``;``) mean what they mean to ROS 2 Jazzy;
-what
-CYCLONEDDS_URI holds is applied last.
+ROS_AUTOMATIC_DISCOVERY_RANGE (OFF, LOCALHOST, SUBNET, SYSTEM_DEFAULT), ROS_LOCALHOST_ONLY (older;
+when 1 the other two are ignored) and ROS_STATIC_PEERS (addresses separated by ``;``) mean what they
+mean to ROS 2 Jazzy; what CYCLONEDDS_URI holds is applied last.
 """
 
 from __future__ import annotations
 
 import html
 import os
-import socket
-import struct
-import sys
 from collections.abc import Mapping
 
 RANGES = ("OFF", "LOCALHOST", "SUBNET", "SYSTEM_DEFAULT")
 
+VARIABLES = (
+    "ROS_AUTOMATIC_DISCOVERY_RANGE",
+    "ROS_LOCALHOST_ONLY",
+    "ROS_STATIC_PEERS",
+    "CYCLONEDDS_URI",
+)
+
 #: one port pair per participant index: how many participants of this machine can see each other
 MAX_PARTICIPANTS = 99
-
 
 # A closing writer waits this long for readers that do not acknowledge, as those of a killed process
 # do not; the default of a second would add up over a node's writers.
 _INTERNAL = "<Internal><WriterLingerDuration>30ms</WriterLingerDuration></Internal>"
+
+# Others forget a process that was killed when they have heard nothing of it for so long (by default
+# ten seconds). Cyclone's own threads report in, so a busy interpreter does not look dead.
+_LEASE = "<LeaseDuration>4s</LeaseDuration><SPDPInterval>1s</SPDPInterval>"
+
+_UNICAST = "<General><AllowMulticast>false</AllowMulticast></General>"
 
 
 class DiscoveryError(RuntimeError):
@@ -36,7 +44,7 @@ def discovery_range(environ: Mapping[str, str]) -> str:
 
     :raises DiscoveryError: ROS_AUTOMATIC_DISCOVERY_RANGE has an unknown value.
     """
-    if environ.get("ROS_LOCALHOST_ONLY", "0") == "1":
+    if _localhost_only(environ):
         return "LOCALHOST"
     wanted = environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "").upper() or "SUBNET"
     if wanted not in RANGES:
@@ -46,51 +54,30 @@ def discovery_range(environ: Mapping[str, str]) -> str:
     return wanted
 
 
-def has_network() -> bool:
-    """Whether an interface other than the loopback is up and has an IPv4 address (always True off
-    Linux).
-    """
-    if not sys.platform.startswith("linux"):
-        return True
-    import fcntl
+def _localhost_only(environ: Mapping[str, str]) -> bool:
+    return environ.get("ROS_LOCALHOST_ONLY", "").startswith("1")
 
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        for _, name in socket.if_nameindex():
-            request = struct.pack("256s", name.encode()[:15])
-            try:
-                flags = struct.unpack_from("<H", fcntl.ioctl(probe, 0x8913, request), 16)[0]
-                fcntl.ioctl(probe, 0x8915, request)
-            except OSError:
-                continue
-            up, loopback = flags & 0x1, flags & 0x8
-            if up and not loopback:
-                return True
-    return False
+
+def settings_in_use(environ: Mapping[str, str] = os.environ) -> str:
+    """The variables that shape the configuration, for error messages: `` with NAME='value'``."""
+    given = [f"{name}={environ[name]!r}" for name in VARIABLES if environ.get(name)]
+    return " with " + ", ".join(given) if given else ""
 
 
 def domain_xml(environ: Mapping[str, str] | None = None) -> str:
     """The configuration for the domain of this process, as Cyclone DDS reads it."""
     environ = os.environ if environ is None else environ
     wanted = discovery_range(environ)
-    peers = [
-        peer.strip() for peer in environ.get("ROS_STATIC_PEERS", "").split(";") if peer.strip()
-    ]
-    # Loopback interfaces have no multicast: without another one SUBNET would find nobody.
-    local = wanted == "LOCALHOST" or (wanted == "SUBNET" and not peers and not has_network())
+    given = "" if _localhost_only(environ) else environ.get("ROS_STATIC_PEERS", "")
+    peers = [peer.strip() for peer in given.split(";") if peer.strip()]
     fragments = []
-    if local:
-        interfaces = '<NetworkInterface address="127.0.0.1" multicast="false"/>'
-        if peers:
-            # Static peers may be other machines, which the loopback does not reach.
-            interfaces = ""
-        general = "<AllowMulticast>false</AllowMulticast>"
-        if interfaces:
-            general = f"<Interfaces>{interfaces}</Interfaces>" + general
-        fragments.append(_fragment(general, _discovery(["127.0.0.1", *peers])))
+    if wanted == "LOCALHOST":
+        # The interface is left to Cyclone as rmw_cyclonedds_cpp does: bound to the loopback, a
+        # process would miss those of this machine that are on the network.
+        fragments.append(_fragment(_UNICAST, _discovery(["127.0.0.1", *peers])))
     elif wanted == "OFF":
-        general = "<AllowMulticast>false</AllowMulticast>"
         tag = f"<ParticipantIndex>none</ParticipantIndex><Tag>ros_discovery_off_{os.getpid()}</Tag>"
-        fragments.append(_fragment(general, tag))
+        fragments.append(_fragment(_UNICAST, tag))
     elif wanted == "SUBNET":
         fragments.append(_fragment("", _discovery(peers)))
     if environ.get("CYCLONEDDS_URI"):
@@ -111,8 +98,7 @@ def _discovery(peers: list[str]) -> str:
 
 
 def _fragment(general: str, discovery: str) -> str:
-    general = f"<General>{general}</General>" if general else ""
     return (
         '<CycloneDDS><Domain Id="any">'
-        f"{general}<Discovery>{discovery}</Discovery>{_INTERNAL}</Domain></CycloneDDS>"
+        f"{general}<Discovery>{discovery}{_LEASE}</Discovery>{_INTERNAL}</Domain></CycloneDDS>"
     )
