@@ -4,7 +4,7 @@ of their own, in a ROS domain of their own (unless ROS_DOMAIN_ID is set). They c
 open again, one of them in its own rhythm. Without ROS 2 and cyclonedds, all run in one process.
 
 It leaves, in DIR: replay.html (open it in a browser), strip.png and recording.json; and prints what
-was measured. Exit code: 0 done, 1 a process failed, 2 bad input.
+was measured. Exit code: 0 done, 1 a node failed, 2 bad input.
 """
 
 from __future__ import annotations

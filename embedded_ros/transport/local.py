@@ -284,26 +284,33 @@ class LocalWaiter(Waiter):
     def __init__(self) -> None:
         self._gate = threading.Lock()
         self._gate.acquire()
-        self._readers: set[Reader] = set()
-        self._ports: tuple[_Port, ...] = ()
+        self._ports: dict[Reader, _Port] = {}
 
     def set_readers(self, readers: set[Reader]) -> None:
-        if readers == self._readers:
+        if readers == self._ports.keys():
             return
-        ports = tuple(reader._port for reader in readers if isinstance(reader, LocalReader))
+        ports: dict[Reader, _Port] = {
+            reader: reader._port for reader in readers if isinstance(reader, LocalReader)
+        }
         with uninterrupted(), _lock:
-            for port in self._ports:
+            for reader in self._ports.keys() - readers:
+                port = self._ports[reader]
                 port.gates = tuple(gate for gate in port.gates if gate is not self._gate)
-            for port in ports:
-                port.gates += (self._gate,)
-            self._readers, self._ports = set(readers), ports
+            for reader in ports.keys() - self._ports.keys():
+                ports[reader].gates += (self._gate,)
+            self._ports = ports
 
     def wait(self, timeout: int | None) -> list[Reader]:
         woken = self._gate.acquire(blocking=False)
-        if not woken and not any(port.samples for port in self._ports):
+        ready = self._ready()
+        if not woken and not ready:
             slice_ = _SLICE if timeout is None else min(max(timeout * 1e-9, 0), _SLICE)
             self._gate.acquire(timeout=slice_)
-        return [r for r in self._readers if isinstance(r, LocalReader) and r._port.samples]
+            ready = self._ready()
+        return ready
+
+    def _ready(self) -> list[Reader]:
+        return [reader for reader, port in self._ports.items() if port.samples]
 
     def wake(self) -> None:
         _open(self._gate)

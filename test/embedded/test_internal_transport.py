@@ -350,6 +350,28 @@ def test_samples_end_a_wait(join, endless):
     waiter.close()
 
 
+def test_a_wait_tells_which_readers_have_samples(join):
+    participant = join()
+    topics = ("rt/one", "rt/two", "rt/three")
+    writers = [participant.create_writer(topic, TYPE, HASH, Qos()) for topic in topics]
+    readers = [participant.create_reader(topic, TYPE, HASH, Qos()) for topic in topics]
+    assert connected([*writers, *readers])
+    waiter = participant.create_waiter()
+    waiter.set_readers({readers[0], readers[1]})
+    waiter.set_readers(set(readers))
+    assert waiter.wait(0) == []
+    writers[1].write(payload(1))
+    assert until(lambda: waiter.wait(None) == [readers[1]])
+    assert waiter.wait(None) == [readers[1]]  # until they are taken
+    writers[2].write(payload(2))
+    assert until(lambda: set(waiter.wait(None)) == set(readers[1:]))
+    waiter.set_readers({readers[0], readers[2]})
+    assert waiter.wait(None) == [readers[2]]
+    readers[2].take(1)
+    assert waiter.wait(0) == []
+    waiter.close()
+
+
 @pytest.mark.timeout(40)
 def test_a_wake_ends_the_present_or_the_next_wait(join, endless):
     waiter = join().create_waiter()
