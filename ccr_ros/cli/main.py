@@ -16,6 +16,7 @@ from collections.abc import Sequence
 from types import ModuleType
 
 from ccr_ros import __version__
+from ccr_ros.model.errors import CcrError
 
 COMMANDS: dict[str, tuple[str, str]] = {
     "demo": ("ccr_ros.cli.demo", "three fingers move on a ROS graph; leaves pictures and a replay"),
@@ -23,6 +24,13 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "solve": ("ccr_ros.cli.solve", "solve one finger for given cable pulls"),
     "bench": ("ccr_ros.cli.bench", "measure speed and accuracy next to other solvers"),
     "run": ("ccr_ros.cli.run", "run a node"),
+    "topic": ("ccr_ros.cli.ros.topic", "list, echo, publish and measure topics"),
+    "node": ("ccr_ros.cli.ros.node", "list nodes, and tell what one has"),
+    "service": ("ccr_ros.cli.ros.service", "list and call services"),
+    "action": ("ccr_ros.cli.ros.action", "list actions and send goals"),
+    "param": ("ccr_ros.cli.ros.param", "list, get and set parameters of nodes"),
+    "lifecycle": ("ccr_ros.cli.ros.lifecycle", "tell and change the state of lifecycle nodes"),
+    "interface": ("ccr_ros.cli.ros.interface", "list and show message, service and action types"),
 }
 
 EXIT_ERROR = 2
@@ -50,11 +58,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         # Whoever read our output has gone (as `| head` does): nothing is left to say.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
-    except Exception as error:
-        from ccr_ros.model.errors import CcrError  # here, as it loads the whole model
-
-        if not isinstance(error, CcrError):
-            raise
+    except CcrError as error:
         print(f"ccr: error: {error}", file=sys.stderr)
         return EXIT_ERROR
 
@@ -65,7 +69,7 @@ def _dispatch(argv: list[str]) -> int:
         usage="ccr COMMAND ...",
         description="Grippers with cable-driven continuum fingers.",
         epilog="commands:\n"
-        + "\n".join(f"  {name:<8} {text}" for name, (_, text) in COMMANDS.items())
+        + "\n".join(f"  {name:<10} {text}" for name, (_, text) in COMMANDS.items())
         + "\n\n`ccr COMMAND --help` tells more.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Interface types by name, and messages filled with values that a person typed as YAML."""
+
+from __future__ import annotations
+
+import copy
+import re
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import yaml
+
+from ccr_ros.cli.ros.graph import unknown
+from ccr_ros.model.errors import CcrError, InvalidValue, UnknownKey
+
+_TYPE_NAME = re.compile(r"[a-z][a-z0-9_]*/(?:(?:msg|srv|action)/)?[A-Za-z][A-Za-z0-9_]*")
+
+
+def message_type(name: str) -> Any:
+    """Return the class of a message: ``std_msgs/msg/String``, or ``std_msgs/String``.
+
+    Raises:
+        CcrError: there is no such message type.
+    """
+    return _interface("message", name, "msg")
+
+
+def service_type(name: str) -> Any:
+    """Return the class of a service.
+
+    Raises:
+        CcrError: there is no such service type.
+    """
+    return _interface("service", name, "srv")
+
+
+def action_type(name: str) -> Any:
+    """Return the class of an action.
+
+    Raises:
+        CcrError: there is no such action type.
+    """
+    return _interface("action", name, "action")
+
+
+def _interface(kind: str, name: str, folder: str) -> Any:
+    import rosidl_runtime_py
+    from rosidl_runtime_py import utilities
+
+    if not _TYPE_NAME.fullmatch(name):
+        raise InvalidValue(f"{kind} type", name, f"written as package/{folder}/Name")
+    try:
+        return getattr(utilities, f"get_{kind}")(name)
+    except (AttributeError, ImportError, LookupError, ValueError) as error:
+        listed = getattr(rosidl_runtime_py, f"get_{kind}_interfaces")()
+        known = [f"{package}/{short}" for package, shorts in listed.items() for short in shorts]
+        full = full_type_name(name, folder)
+        there = [one for one in known if one.startswith(full.split("/")[0] + "/")]
+        raise unknown(f"{kind} type", full, there or known) from error
+
+
+def full_type_name(name: str, folder: str) -> str:
+    """Return ``package/folder/Name`` of a type that may be written without the folder."""
+    package, *_, short = name.split("/")
+    return f"{package}/{folder}/{short}"
+
+
+def read_values(text: str, from_stdin: bool = False) -> dict[str, Any]:
+    """Return the mapping that a YAML text holds.
+
+    Args:
+        text: The text; an empty one gives an empty mapping.
+        from_stdin: Whether to read standard input instead.
+
+    Raises:
+        CcrError: it is no YAML, or not a mapping.
+    """
+    text = sys.stdin.read() if from_stdin else text
+    values = read_yaml(text)
+    if values is None:
+        return {}
+    if not isinstance(values, dict):
+        raise InvalidValue("values", text, "a YAML mapping of fields, as '{data: 1}'")
+    return values
+
+
+def read_yaml(text: str) -> Any:
+    """Return what a YAML text holds.
+
+    Raises:
+        CcrError: it is no YAML.
+    """
+    try:
+        return yaml.safe_load(text)
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        place = f" at line {mark.line + 1}, column {mark.column + 1}" if mark else ""
+        reason = getattr(error, "problem", None) or str(error).splitlines()[0]
+        raise CcrError(f"not YAML{place}: {reason}: {' '.join(text.split())[:80]!r}") from error
+
+
+def fill(message: Any, values: dict[str, Any], **expand: bool) -> list[Callable[[Any], None]]:
+    """Set fields of a message, in place.
+
+    Args:
+        message: The message.
+        values: Fields and their values, nested as the message is.
+        expand: ``expand_header_auto`` and ``expand_time_now`` of
+            ``rosidl_runtime_py.set_message_fields``.
+
+    Returns:
+        Functions that set the time fields which were given as ``auto`` or ``now``.
+
+    Raises:
+        UnknownKey: the message has no such field.
+        InvalidValue: the value does not fit its field.
+    """
+    from rosidl_runtime_py import set_message_fields
+
+    _check(message, values, "", expand)
+    return set_message_fields(message, values, **expand)
+
+
+def _check(message: Any, values: dict[str, Any], place: str, expand: dict[str, bool]) -> None:
+    """Find the first field that cannot be set, and raise the error that names it."""
+    from rosidl_runtime_py import set_message_fields
+
+    fields = message.get_fields_and_field_types()
+    for key, value in values.items():
+        where = f"{place}.{key}" if place else str(key)
+        if key not in fields:
+            raise UnknownKey(where, value, ", ".join(fields))
+        part, element = getattr(message, key), _message_of_sequence(fields[key])
+        if isinstance(value, dict) and hasattr(part, "get_fields_and_field_types"):
+            _check(part, value, where, expand)
+        elif isinstance(value, list) and element:
+            for index, item in enumerate(value):
+                if not isinstance(item, dict):
+                    raise InvalidValue(f"{where}[{index}]", item, f"a mapping ({fields[key]})")
+                _check(element(), item, f"{where}[{index}]", expand)
+        try:
+            # A copy, as rosidl_runtime_py puts messages into the lists that it is given.
+            set_message_fields(type(message)(), {key: copy.deepcopy(value)}, **expand)
+        except Exception as error:  # what is raised differs from field to field
+            raise InvalidValue(where, value, fields[key]) from error
+
+
+def _message_of_sequence(field_type: str) -> Any:
+    """Return the class of the messages that an array or sequence field holds, or None."""
+    found = re.fullmatch(r"(?:sequence<)?(\w+/\w+)(?:, \d+)?(?:>|\[\d+\])", field_type)
+    return message_type(found[1]) if found else None
