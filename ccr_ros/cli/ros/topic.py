@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Look at topics, and publish on them, as `ros2 topic` does.
 
-  ccr topic list -t
-  ccr topic echo /gripper/joint_states --once
-  ccr topic pub -1 /chatter std_msgs/msg/String 'data: hello'
-  ccr topic hz /gripper/joint_states
+ccr topic list -t
+ccr topic echo /gripper/joint_states --once
+ccr topic pub -1 /chatter std_msgs/msg/String 'data: hello'
+ccr topic hz /gripper/joint_states
 """
 
 from __future__ import annotations

@@ -14,6 +14,7 @@ import yaml
 from ccr_ros.cli.ros.graph import unknown
 from ccr_ros.model.errors import CcrError, InvalidValue, UnknownKey
 
+_KINDS = {"msg": "message", "srv": "service", "action": "action"}
 _TYPE_NAME = re.compile(r"[a-z][a-z0-9_]*/(?:(?:msg|srv|action)/)?[A-Za-z][A-Za-z0-9_]*")
 
 
@@ -42,6 +43,18 @@ def action_type(name: str) -> Any:
         CcrError: there is no such action type.
     """
     return _interface("action", name, "action")
+
+
+def interface_type(name: str) -> Any:
+    """Return the class of a message, service or action, by its name in three parts.
+
+    Raises:
+        CcrError: there is no such type.
+    """
+    folder = name.split("/")[1] if name.count("/") == 2 else ""
+    if folder not in _KINDS:
+        raise InvalidValue("type", name, "written as package/msg/Name (or srv, action)")
+    return _interface(_KINDS[folder], name, folder)
 
 
 def _interface(kind: str, name: str, folder: str) -> Any:
