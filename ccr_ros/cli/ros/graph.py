@@ -25,7 +25,11 @@ NamesAndTypes = list[tuple[str, list[str]]]
 
 @contextmanager
 def graph_node(
-    args: argparse.Namespace, name: str | None = None, *, settle: bool = True
+    args: argparse.Namespace,
+    name: str | None = None,
+    *,
+    settle: bool = True,
+    signals: bool = True,
 ) -> Iterator[Any]:
     """Give a node that has seen the graph, until the block ends.
 
@@ -33,6 +37,7 @@ def graph_node(
         args: What the command line said of ``--spin-time`` and ``--use-sim-time``.
         name: The node's name; default: a hidden one.
         settle: Whether to wait until the graph is known if no ``--spin-time`` is given.
+        signals: Whether SIGINT and SIGTERM end rclpy; else the block has to see to them.
 
     Raises:
         CcrError: the block gave rclpy a name that is not valid.
@@ -42,9 +47,11 @@ def graph_node(
     from rclpy.exceptions import NameValidationException
     from rclpy.executors import ExternalShutdownException
     from rclpy.parameter import Parameter
+    from rclpy.signals import SignalHandlerOptions
 
     try:
-        rclpy.init(args=[])
+        handled = SignalHandlerOptions.ALL if signals else SignalHandlerOptions.NO
+        rclpy.init(args=[], signal_handler_options=handled)
         node = rclpy.create_node(
             name or f"{NODE_PREFIX}_{os.getpid()}",
             start_parameter_services=False,
@@ -59,9 +66,7 @@ def graph_node(
         finally:
             node.destroy_node()
     except NameValidationException as error:
-        # Its text has three lines: what is wrong, the name, and an arrow at the place.
-        what, shown, *_ = str(error).splitlines()
-        raise CcrError(f"{what} {shown.strip()}") from error
+        raise _invalid_name(error) from error
     except ExternalShutdownException:
         raise SystemExit(EXIT_TERMINATED) from None
     finally:
@@ -124,9 +129,14 @@ def full_name(node: Any, name: str) -> str:
     try:
         full = expand_topic_name(name, node.get_name(), node.get_namespace())
     except ValueError as error:
-        raise CcrError(str(error)) from error
+        raise _invalid_name(error) from error
     validate_full_topic_name(full)
     return full
+
+
+def _invalid_name(error: Exception) -> CcrError:
+    # rclpy's text has three lines: what is wrong, the name, and an arrow at the place.
+    return CcrError(" ".join(line.strip() for line in str(error).splitlines()[:2]))
 
 
 def node_names(node: Any, include_hidden: bool = False) -> list[str]:
@@ -175,6 +185,7 @@ def wait_for_type(
     type_name: str,
     pairs: Callable[[], NamesAndTypes],
     timeout: float,
+    notice: str = "",
 ) -> None:
     """Wait for a service or action; to be called before the own client puts the name there.
 
@@ -185,6 +196,7 @@ def wait_for_type(
         type_name: The type that it shall have.
         pairs: Gives the names and types in the graph.
         timeout: How long to wait [s].
+        notice: What to print if it is not there at once.
 
     Raises:
         CcrError: it does not show up, or has another type.
@@ -194,7 +206,8 @@ def wait_for_type(
         return name in dict(pairs())
 
     if not spin_until(node, there, min(1.0, timeout)):
-        print(f"waiting for {kind} to become available...")
+        if notice:
+            print(notice)
         spin_until(node, there, timeout)
     types = types_of(kind, name, visible(pairs(), True))
     if type_name not in types:

@@ -120,9 +120,14 @@ def run_call(args: argparse.Namespace) -> None:
         kind = service_type(args.service_type)
         request = kind.Request()
         fill(request, values)
-        type_name = full_type_name(args.service_type, "srv")
         wait_for_type(
-            node, "service", name, type_name, node.get_service_names_and_types, args.timeout
+            node,
+            "service",
+            name,
+            full_type_name(args.service_type, "srv"),
+            node.get_service_names_and_types,
+            args.timeout,
+            notice="waiting for service to become available...",
         )
         client = node.create_client(kind, name)
         if not spin_until(node, client.service_is_ready, args.timeout):

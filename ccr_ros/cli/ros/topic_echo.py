@@ -60,6 +60,7 @@ def add_verb(verbs: Verbs) -> None:
 def run_echo(args: argparse.Namespace) -> int:
     """Print messages until told to end."""
     import rclpy
+    from rclpy.event_handler import SubscriptionEventCallbacks
     from rclpy.task import Future
 
     passes = expression(args.filter)
@@ -84,25 +85,17 @@ def run_echo(args: argparse.Namespace) -> int:
                 if args.once:
                     done.set_result(True)
 
-        _subscribe(node, kind, name, receive, profile_for_publishers(node, name, args), args)
+        profile = profile_for_publishers(node, name, args)
+        lost = SubscriptionEventCallbacks(
+            message_lost=None if args.no_lost_messages else _tell_of_loss
+        )
+        node.create_subscription(kind, name, receive, profile, event_callbacks=lost, raw=args.raw)
         if args.timeout is not None:
             node.create_timer(args.timeout, lambda: done.done() or done.set_result(False))
         rclpy.spin_until_future_complete(node, done)
     if args.once and not shown:
         raise CcrError(f"no message on topic {name!r} in {args.timeout:g} s")
     return 0
-
-
-def _subscribe(
-    node: Any, kind: Any, name: str, callback: Callable[..., None], profile: Any, args: Any
-) -> None:
-    from rclpy.event_handler import SubscriptionEventCallbacks, UnsupportedEventTypeError
-
-    lost = None if args.no_lost_messages else SubscriptionEventCallbacks(message_lost=_tell_of_loss)
-    try:
-        node.create_subscription(kind, name, callback, profile, event_callbacks=lost, raw=args.raw)
-    except UnsupportedEventTypeError:
-        node.create_subscription(kind, name, callback, profile, raw=args.raw)
 
 
 def _tell_of_loss(status: Any) -> None:
