@@ -185,6 +185,7 @@ def run_send_goal(args: argparse.Namespace) -> int:
 def _follow(
     node: Any, client: Any, goal: Any, feedback: bool, interrupted: Callable[[], int]
 ) -> int:
+    import rclpy
     from action_msgs.msg import GoalStatus
     from rosidl_runtime_py import message_to_yaml
 
@@ -193,7 +194,8 @@ def _follow(
 
     def wait(future: Any) -> bool:
         """Tell whether the future is done, rather than a signal there."""
-        spin_until(node, lambda: future.done() or bool(interrupted()))
+        while not future.done() and not interrupted():
+            rclpy.spin_until_future_complete(node, future, timeout_sec=0.1)
         return future.done()
 
     print(f"Sending goal:\n     {message_to_yaml(goal)}")

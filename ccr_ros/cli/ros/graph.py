@@ -45,7 +45,6 @@ def graph_node(
     """
     import rclpy
     from rclpy.exceptions import NameValidationException
-    from rclpy.executors import ExternalShutdownException
     from rclpy.parameter import Parameter
     from rclpy.signals import SignalHandlerOptions
 
@@ -57,19 +56,29 @@ def graph_node(
             start_parameter_services=False,
             parameter_overrides=[Parameter("use_sim_time", value=args.use_sim_time)],
         )
-        try:
-            if args.spin_time is not None:
-                spin_until(node, lambda: False, args.spin_time)
-            elif settle or args.use_sim_time:
-                _settle(node)
-            yield node
-        finally:
-            node.destroy_node()
+    except NameValidationException as error:
+        rclpy.try_shutdown()
+        raise _invalid_name(error) from error
+    except RuntimeError as error:
+        rclpy.try_shutdown()
+        raise CcrError(f"cannot join the ROS graph: {' '.join(str(error).split())}") from error
+    try:
+        if args.spin_time is not None:
+            spin_until(node, lambda: False, args.spin_time)
+        elif settle or args.use_sim_time:
+            _settle(node)
+        yield node
+        if not rclpy.ok():
+            raise SystemExit(EXIT_TERMINATED)
     except NameValidationException as error:
         raise _invalid_name(error) from error
-    except ExternalShutdownException:
-        raise SystemExit(EXIT_TERMINATED) from None
+    except Exception:
+        # After a SIGTERM, rclpy's functions return, or raise one error or another.
+        if not rclpy.ok():
+            raise SystemExit(EXIT_TERMINATED) from None
+        raise
     finally:
+        node.destroy_node()
         rclpy.try_shutdown()
 
 

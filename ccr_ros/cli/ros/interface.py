@@ -10,6 +10,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import re
 import sys
 from collections.abc import Iterable
@@ -150,11 +151,9 @@ def _definition(name: str) -> list[str]:
 def _built_in(name: str) -> str:
     """Return the text of a type that has no file: the embedded runtime has such."""
     if not real_ros():
-        from embedded_ros.interfaces.definition_text import definition_text
+        from embedded_ros.interfaces.registry import registry
 
-        try:
-            return definition_text(name)
-        except KeyError:
-            pass
+        with contextlib.suppress(KeyError):
+            return registry.text(name)
     interface_type(name)  # raises the error that tells what there is
     raise CcrError(f"{name!r} has no definition that can be read")

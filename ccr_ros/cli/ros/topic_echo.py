@@ -117,8 +117,7 @@ def _selector(kind: Any, path: str | None) -> Callable[[Any], Any]:
     for depth, name in enumerate(names):
         fields: dict[str, str] = getattr(part, "get_fields_and_field_types", dict)()
         if name not in fields:
-            where = ".".join(names[: depth + 1])
-            raise UnknownKey(f"--field {where}", name, ", ".join(fields) or "none")
+            raise UnknownKey(".".join(names[: depth + 1]), name, ", ".join(fields) or "none")
         part = getattr(part, name)
 
     def select(message: Any) -> Any:

@@ -67,10 +67,11 @@ def _interface(kind: str, name: str, folder: str) -> Any:
         return getattr(utilities, f"get_{kind}")(name)
     except (AttributeError, ImportError, LookupError, ValueError) as error:
         listed = getattr(rosidl_runtime_py, f"get_{kind}_interfaces")()
-        known = [f"{package}/{short}" for package, shorts in listed.items() for short in shorts]
-        full = full_type_name(name, folder)
-        there = [one for one in known if one.startswith(full.split("/")[0] + "/")]
-        raise unknown(f"{kind} type", full, there or known) from error
+        package, _, short = full_type_name(name, folder).split("/")
+        if package not in listed:
+            raise unknown("package", package, listed, f" with {kind} types") from error
+        names = [one.rpartition("/")[2] for one in listed[package]]
+        raise unknown(f"{kind} type", short, names, f" in {package}") from error
 
 
 def full_type_name(name: str, folder: str) -> str:
