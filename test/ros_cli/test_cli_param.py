@@ -3,6 +3,8 @@ import pytest
 import yaml
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 
+from ccr_ros.cli.ros import param
+
 VALUES = {
     "flag": True,
     "count": 5,
@@ -130,7 +132,8 @@ def test_errors(ccr, robot, tmp_path):
     assert error("delete", "/ns/robot", "cout") == near
     assert error("set", "/ns/robot", "count", "[1").startswith("not YAML at line 1")
     assert error("set", "/ns/robot", "count", "{a: 1}") == (
-        "value '{a: 1}' is none that a parameter can have\n"
+        "value: '{a: 1}' is not allowed; must be a boolean, number or string, or a list of one "
+        "of these\n"
     )
     assert error("list", "/ns/robot", "--filter", "(").startswith("--filter '(' is no regular ")
     assert error("load", "/ns/robot", "/no/file.yaml") == (
@@ -141,7 +144,8 @@ def test_errors(ccr, robot, tmp_path):
     assert error("load", "/ns/robot", str(file)).startswith(f"{file}: ")
 
 
-def test_a_node_without_parameter_services(ccr, make_peer):
+def test_a_node_without_parameter_services(ccr, make_peer, monkeypatch):
+    monkeypatch.setattr(param, "_ANSWER_LIMIT", 1.0)
     make_peer("mute", start_parameter_services=False)
     assert ccr("param", "list").out == ""
     done = ccr("param", "get", "/mute", "count")

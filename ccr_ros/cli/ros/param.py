@@ -23,12 +23,13 @@ from ccr_ros.cli.ros.graph import find_node, graph_node, node_names, unknown
 from ccr_ros.cli.ros.types import read_yaml
 from ccr_ros.cli.ros.verbs import Run, Verbs, positive_float
 from ccr_ros.cli.ros.verbs import run_verb as run
-from ccr_ros.model.errors import CcrError, InvalidFile
+from ccr_ros.model.errors import CcrError, InvalidFile, InvalidValue
 
 __all__ = ["add_arguments", "run"]
 
 EXIT_REFUSED = 1
 _ANSWER_LIMIT = 5.0  # s; nodes answer in milliseconds while they spin
+_ALLOWED = "a boolean, number or string, or a list of one of these"
 
 #: ParameterType: its word in lists, and what ``get`` prints before the value
 _TYPES = (
@@ -200,7 +201,8 @@ def run_get(args: argparse.Namespace) -> int:
 
 def run_set(args: argparse.Namespace) -> int:
     """Set a parameter."""
-    read_yaml(args.value)
+    if isinstance(read_yaml(args.value), dict):
+        raise InvalidValue("value", args.value, _ALLOWED)
 
     def put(parameters: _Parameters) -> int:
         from rcl_interfaces.msg import Parameter
@@ -209,7 +211,7 @@ def run_set(args: argparse.Namespace) -> int:
         try:
             value = get_parameter_value(args.value)
         except Exception as error:  # what is raised differs from value to value
-            raise CcrError(f"value {args.value!r} is none that a parameter can have") from error
+            raise InvalidValue("value", args.value, _ALLOWED) from error
         (result,) = parameters.set([Parameter(name=args.parameter_name, value=value)])
         return _tell("Set parameter successful", "Setting parameter failed", result)
 
