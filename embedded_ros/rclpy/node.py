@@ -27,6 +27,7 @@ from .parameter import Parameter
 from .parameter_service import ParameterService
 from .qos import qos_profile_parameter_events
 from .time_source import TimeSource
+from .type_description_service import TypeDescriptionService
 from .utilities import get_default_context
 from .validate_full_topic_name import validate_full_topic_name
 from .validate_namespace import validate_namespace
@@ -111,6 +112,7 @@ class Node(ParameterHolder, EntityHolder, GraphViewer, Destroyable):
             self._parameter_service = ParameterService(self)
         if enable_logger_service:
             self._logger_service = LoggingService(self)
+        self._type_description_service = TypeDescriptionService(self)
 
     @staticmethod
     def _free_descriptor() -> Any:
