@@ -17,6 +17,7 @@ from .measure import OWN, Row, measure, set_error
 from .memory import measure_memory
 from .suites import memory_plans, plans
 from .table import table
+from .transport import connections, measure_connection
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -63,7 +64,8 @@ def run(quick: bool, pattern: str = "*") -> list[Row]:
             ).id
         )
     ]
-    total = len(timed) + len(memory)
+    sent = [row for plan in connections(quick) if wanted((row := plan.row()).id)]
+    total = len(timed) + len(memory) + len(sent)
     rows: list[Row] = []
     for plan in timed:
         _progress(len(rows), total, plan.id)
@@ -73,6 +75,10 @@ def run(quick: bool, pattern: str = "*") -> list[Row]:
     for row in memory:
         _progress(len(rows), total, row.id)
         row.memory_mb = measure_memory(row.name, row.case, row.n)
+        rows.append(row)
+    for row in sent:
+        _progress(len(rows), total, row.id)
+        measure_connection(row, quick)
         rows.append(row)
     _progress(len(rows), total, "done")
     _set_ratios(rows)

@@ -29,6 +29,7 @@ GROUPS: dict[str, str] = {
     "cable-model": "Frictionless cable (total length given) or proportional spans (the paper's)",
     "discretisation": "Accuracy against arcs per segment and their order",
     "memory": "Peak resident memory of build and five steps, above the imported libraries",
+    "transport": "Messages between two processes, and a node that idles",
 }
 
 

@@ -47,7 +47,17 @@ MEMORY: tuple[Column, ...] = (
     ("ratio", lambda r: _times(r.ratio)),
     ("note", lambda r: r.note),
 )
-TEXT = {"solver", "note"}  # left-aligned
+SENT: tuple[Column, ...] = (
+    ("carrier", lambda r: r.name),
+    ("p50 ms", lambda r: _number(r.p50_ms, ".3f")),
+    ("p99 ms", lambda r: _number(r.p99_ms, ".3f")),
+    ("cpu ms", lambda r: _number(r.cpu_ms, ".3f")),
+    ("p50 ratio", lambda r: _times(r.ratio)),
+    ("cpu ratio", lambda r: _times(r.cpu_ratio)),
+    ("note", lambda r: r.note),
+)
+COLUMNS = {"memory": MEMORY, "transport": SENT}
+TEXT = {"solver", "carrier", "note"}  # left-aligned
 
 
 def table(rows: Sequence[Row]) -> str:
@@ -58,13 +68,15 @@ def table(rows: Sequence[Row]) -> str:
         if members:
             baselines = " or ".join(dict.fromkeys(f"{row.baseline!r}" for row in members))
             parts.append(f"{title}\n{'=' * len(title)}\nratios are to {baselines}\n")
-            parts.append(_group(members, MEMORY if group == "memory" else TIMED))
+            parts.append(_group(members, COLUMNS.get(group, TIMED)))
     parts.append(
         "Lower is better in every column. p50, p99: wall time of one warm step, single-threaded;\n"
         "cpu: median CPU time of a step, which other programs on the machine disturb less.\n"
         "RMS: over disk centres at the end of the sweep, against the independent reference rod\n"
         "(% of the finger's length); with *, against ccr_ros: the reference has other disks.\n"
-        "iter.: median per step."
+        "iter.: median per step.\n"
+        "transport: p50, p99 from publish to callback, or of calling a service until its answer;\n"
+        "cpu of both processes for one of them, or of an idle node in a second."
     )
     return "\n".join(parts)
 

@@ -29,12 +29,14 @@ class Case:
         make: Makes the message.
         header: Its header, None for the Float64, whose value is the time [ns].
         offset: Of eight bytes in the encoded message that may be anything.
+        period: Seconds between two messages.
     """
 
     n: int
     make: Callable[[], Any]
     header: Callable[[Any], Any] | None
     offset: int
+    period: float = 0.01
 
     def stamp(self, message: Any) -> None:
         """Write the present time into the message."""
@@ -71,7 +73,10 @@ def _markers() -> Any:
 CASES = {
     "Float64": Case(1, Float64, None, 4),
     "PoseArray": Case(POSES, _poses, lambda m: m.header, 4),
-    "MarkerArray": Case(MARKERS, _markers, lambda m: m.markers[0].header, 8),
+    # At a rate that all carriers keep up with.
+    "MarkerArray": Case(MARKERS, _markers, lambda m: m.markers[0].header, 8, 0.05),
+    "round trip": Case(1, Float64, None, 4),
+    "idle": Case(1, Float64, None, 4),
 }
 
 

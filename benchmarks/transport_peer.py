@@ -1,18 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One end of a measured connection: ``python -m benchmarks.transport_peer CARRIER CASE ROLE COUNT``.
+"""One end of a connection: ``python -m benchmarks.transport_peer CARRIER CASE ROLE COUNT``.
 
-The ``send``er publishes COUNT messages at 100 Hz, the ``receive``r notes how long each took from
-the call of publish to the start of its callback. Both print what they measured as JSON.
+``send`` publishes COUNT messages, ``receive`` notes how long each took from the call of publish to
+the start of its callback; ``call`` and ``serve`` are the ends of COUNT round trips; ``idle`` does
+nothing for COUNT seconds. All print what they measured as JSON.
 """
 
 from __future__ import annotations
 
-import itertools
 import json
 import struct
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from ccr_ros.runtime import enable_ros
@@ -21,7 +21,6 @@ enable_ros()
 
 from .transport_cases import CASES, Case  # noqa: E402
 
-PERIOD = 0.01  # s
 WARM_UP = 50  # messages that are not counted
 DEPTH = 2000  # nothing is lost however long one end is held up
 SETTLE = 1.0  # s, after which an idle node has said all it had to say
@@ -31,23 +30,28 @@ class Meter:
     """Counts messages; after COUNT (and those for warming up) it prints its figures and ends."""
 
     def __init__(self, count: int) -> None:
-        self._left = WARM_UP + count
+        self.left = WARM_UP + count
         self._count = count
         self._cpu = 0.0
         self._ages: list[float] = []
 
     def note(self, age: float | None = None) -> None:
         """Count a message, `age` ms old."""
-        if self._left == self._count:
+        if self.left == self._count:
             self._cpu = time.process_time()
             self._ages.clear()
-        self._left -= 1
+        self.left -= 1
         if age is not None:
             self._ages.append(age)
-        if self._left == 0:
+        if self.left == 0:
             cpu = 1e3 * (time.process_time() - self._cpu) / self._count
             print(json.dumps({"cpu_ms": cpu, "ages_ms": self._ages}), flush=True)
             raise SystemExit
+
+    @property
+    def total(self) -> int:
+        """All messages, those for warming up included."""
+        return WARM_UP + self._count
 
 
 class Rclpy:
@@ -71,7 +75,7 @@ class Rclpy:
                 publisher.publish(message)
                 meter.note()
 
-        self._node.create_timer(PERIOD, publish)
+        self._node.create_timer(case.period, publish)
         self._rclpy.spin(self._node)
 
     def receive(self, meter: Meter) -> None:
@@ -82,19 +86,41 @@ class Rclpy:
         print("ready", flush=True)
         self._rclpy.spin(self._node)
 
-    def idle(self, seconds: float) -> None:
+    def call(self, meter: Meter) -> None:
+        """Call a service and spin until it has answered, again and again."""
+        from std_srvs.srv import Trigger
+
+        client = self._node.create_client(Trigger, "bench")
+        client.wait_for_service()
+        while True:
+            time.sleep(self._case.period)
+            begin = time.monotonic_ns()
+            future = client.call_async(Trigger.Request())
+            self._rclpy.spin_until_future_complete(self._node, future)
+            meter.note((time.monotonic_ns() - begin) * 1e-6)
+
+    def serve(self, meter: Meter) -> None:
+        """Answer."""
+        from std_srvs.srv import Trigger
+
+        def answer(_: Any, response: Any) -> Any:
+            if meter.left > 1:
+                meter.note()
+            else:
+                self._node.create_timer(0.2, meter.note)  # once the last answer has been sent
+            return response
+
+        self._node.create_service(Trigger, "bench", answer)
+        print("ready", flush=True)
+        self._rclpy.spin(self._node)
+
+    def wait(self, seconds: float) -> None:
         """Spin a node that has nothing to do."""
-        executor = self._rclpy.executors.SingleThreadedExecutor()
+        executor = self._rclpy.get_global_executor()
         executor.add_node(self._node)
-
-        def spin(until: float) -> None:
-            while (left := until - time.monotonic()) > 0:
-                executor.spin_once(timeout_sec=left)
-
-        spin(time.monotonic() + SETTLE)
-        before = time.process_time()
-        spin(time.monotonic() + seconds)
-        print(json.dumps({"cpu_ms": 1e3 * (time.process_time() - before) / seconds}), flush=True)
+        until = time.monotonic() + seconds
+        while (left := until - time.monotonic()) > 0:
+            executor.spin_once(timeout_sec=left)
 
 
 class Cyclone:
@@ -130,41 +156,82 @@ class Cyclone:
     def _age(self, sample: Any) -> float:
         return self._case.age(sample)
 
-    def _topic(self) -> Any:
+    def _writer(self, topic: str = "bench") -> Any:
+        from cyclonedds.pub import DataWriter
         from cyclonedds.topic import Topic
 
-        return Topic(self._participant, "bench", self._kind, qos=self._qos)
+        topic = Topic(self._participant, topic, self._kind, qos=self._qos)
+        return DataWriter(self._participant, topic, qos=self._qos)
 
-    def send(self, meter: Meter) -> None:
-        """Publish from a loop."""
-        from cyclonedds.pub import DataWriter
-
-        writer = DataWriter(self._participant, self._topic(), qos=self._qos)
-        stamped = self._messages()
-        while not writer.get_matched_subscriptions():
-            time.sleep(PERIOD)
-        begin = time.monotonic()
-        for turn in itertools.count():
-            time.sleep(max(0.0, begin + turn * PERIOD - time.monotonic()))
-            writer.write(stamped())
-            if turn == WARM_UP + meter._count - 1:
-                time.sleep(0.5)
-            meter.note()
-
-    def receive(self, meter: Meter) -> None:
-        """Wait in a wait set and take."""
+    def _samples(self, topic: str = "bench") -> Iterator[Any]:
+        """Samples as they come, out of a wait set."""
         from cyclonedds.core import ReadCondition, ViewState, WaitSet
         from cyclonedds.sub import DataReader
+        from cyclonedds.topic import Topic
 
-        reader = DataReader(self._participant, self._topic(), qos=self._qos)
+        topic = Topic(self._participant, topic, self._kind, qos=self._qos)
+        reader = DataReader(self._participant, topic, qos=self._qos)
         waiter = WaitSet(self._participant)
         waiter.attach(ReadCondition(reader, ViewState.Any))
-        print("ready", flush=True)
+        yield None
         while True:
             waiter.wait(10**9)
             for sample in reader.take(N=10):
                 if sample.sample_info.valid_data:
-                    meter.note(self._age(sample))
+                    yield sample
+
+    def send(self, meter: Meter) -> None:
+        """Publish from a loop."""
+        writer = self._writer()
+        stamped = self._messages()
+        while not writer.get_matched_subscriptions():
+            time.sleep(0.01)
+        begin = time.monotonic()
+        for turn in range(meter.total):
+            time.sleep(max(0.0, begin + turn * self._case.period - time.monotonic()))
+            writer.write(stamped())
+            if turn == meter.total - 1:
+                time.sleep(0.5)  # for the last ones to arrive
+            meter.note()
+
+    def receive(self, meter: Meter) -> None:
+        """Note the age of each message."""
+        samples = self._samples()
+        next(samples)
+        print("ready", flush=True)
+        for sample in samples:
+            meter.note(self._age(sample))
+
+    def call(self, meter: Meter) -> None:
+        """Send, and wait for what comes back."""
+        writer, answers, stamped = self._writer("ask"), self._samples("tell"), self._messages()
+        next(answers)
+        while not writer.get_matched_subscriptions():
+            time.sleep(0.01)
+        time.sleep(0.2)  # for the other direction to be connected too
+        while True:
+            time.sleep(self._case.period)
+            writer.write(stamped())
+            meter.note(self._age(next(answers)))
+
+    def serve(self, meter: Meter) -> None:
+        """Send back what comes."""
+        writer, samples = self._writer("tell"), self._samples("ask")
+        next(samples)
+        print("ready", flush=True)
+        for sample in samples:
+            writer.write(sample)
+            if meter.left == 1:
+                time.sleep(0.2)  # for the last answer to arrive
+            meter.note()
+
+    def wait(self, seconds: float) -> None:
+        """Wait for a message that does not come."""
+        from cyclonedds.core import GuardCondition, WaitSet
+
+        waiter = WaitSet(self._participant)
+        waiter.attach(GuardCondition(self._participant))
+        waiter.wait(int(seconds * 1e9))
 
 
 class Bytes(Cyclone):
@@ -202,7 +269,10 @@ def main(carrier: str, case: str, role: str, count: int) -> None:
     """Be one end."""
     end = CARRIERS[carrier](CASES[case], role)
     if role == "idle":
-        end.idle(count)
+        end.wait(SETTLE)
+        before = time.process_time()
+        end.wait(count)
+        print(json.dumps({"cpu_ms": 1e3 * (time.process_time() - before) / count, "ages_ms": []}))
     else:
         getattr(end, role)(Meter(count))
 

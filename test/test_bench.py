@@ -200,7 +200,7 @@ def test_full_plan_covers_what_is_promised():
         for n in (9, 30, 90):
             assert {f"sweep/{name}/n{n}/ccr_ros", f"sweep/{name}/n{n}/ipopt"} <= ids
         assert {f"sweep/{name}/n9/trust-constr", f"sweep/{name}/n9/slsqp"} <= ids
-    assert {plan.group for plan in plans(quick=False)} | {"memory"} == set(GROUPS)
+    assert {plan.group for plan in plans(quick=False)} | {"memory", "transport"} == set(GROUPS)
     assert len(ids) == len(list(plans(quick=False)))
     assert len(set(memory_plans(quick=False))) == len(memory_plans(quick=False))
     for quick in (False, True):
@@ -231,6 +231,9 @@ def test_quick_bench_end_to_end():
     for row in rows:
         if row.group == "memory":
             assert row.memory_mb > 0
+        elif row.group == "transport":
+            assert row.p99_ms >= row.p50_ms > 0
+            assert row.cpu_ms > 0
         elif row.steps < row.steps_wanted:
             assert row.note.startswith(f"{row.steps} steps of {row.steps_wanted}, stopped at")
         else:

@@ -39,7 +39,8 @@ class Publisher(Destroyable):
         self.event_handlers = event_callbacks.create_event_handlers(callback_group, self, topic)
 
     def publish(self, msg: Any) -> None:
-        """Send a message, or the bytes of an encoded one.
+        """Send a message, or the bytes of an encoded one. Waits for at most half a second for
+        subscribers that stand still, where the history is KEEP_ALL.
 
         :raises TypeError: the message is of another type than the publisher's.
         """
@@ -49,7 +50,13 @@ class Publisher(Destroyable):
             payload = msg
         else:
             raise TypeError(f"Expected {self.msg_type}, got {type(msg)}")
-        self.handle._endpoint.write(payload)
+        try:
+            self.handle._endpoint.write(payload)
+        except TimeoutError as error:
+            # Somebody else's standstill must not end this program.
+            self._node.get_logger().warning(
+                f"dropped a message on '{self._full_topic}': {error}", throttle_duration_sec=1.0
+            )
 
     def get_subscription_count(self) -> int:
         """How many subscriptions are connected."""

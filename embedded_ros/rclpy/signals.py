@@ -2,8 +2,8 @@
 """SIGINT and SIGTERM end all contexts, after which spinning raises or returns.
 
 The handler that was there before is called as well: for SIGINT that is Python's, which raises
-KeyboardInterrupt. Not for a second signal within a second of the first: it means the same, and would
-only break the program's cleaning up.
+KeyboardInterrupt. A second signal within a second of the first means the same and does nothing, as
+it would only break into the program's cleaning up.
 """
 
 from __future__ import annotations

@@ -75,7 +75,11 @@ class Writer(ABC):
 
     @abstractmethod
     def write(self, payload: bytes) -> None:
-        """Send one payload. Blocks for at most half a second when a keep-all history is full."""
+        """Send one payload.
+
+        :raises TimeoutError: a keep-all history stayed full for half a second, as some reader's
+            process stands still; the payload is dropped.
+        """
 
     @abstractmethod
     def matched(self) -> int:

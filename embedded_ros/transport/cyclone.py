@@ -138,6 +138,8 @@ class CycloneWriter(Writer):
         if rest := len(payload) % 4:
             payload += bytes(4 - rest)
         result = _write(self._writer._ref, _Payload(payload, len(payload)))
+        if result == DDSException.DDS_RETCODE_TIMEOUT:
+            raise TimeoutError("a reader takes nothing")
         if result < 0:
             raise DDSException(result, "while writing")
 

@@ -105,10 +105,10 @@ def bench(make_node, executor, spin, finish):
 class Program:
     """A test program in a process of its own."""
 
-    def __init__(self, name, *arguments, **environment):
+    def __init__(self, name, *arguments, prefix=(), **environment):
         path = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
         self.process = subprocess.Popen(
-            [sys.executable, "-u", str(PROGRAMS / name), *arguments],
+            [*prefix, sys.executable, "-u", str(PROGRAMS / name), *arguments],
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
@@ -138,8 +138,8 @@ def program():
     """Start test programs that are killed with the test."""
     started = []
 
-    def start(name, *arguments, **environment):
-        started.append(Program(name, *arguments, **environment))
+    def start(name, *arguments, **options):
+        started.append(Program(name, *arguments, **options))
         return started[-1]
 
     yield start

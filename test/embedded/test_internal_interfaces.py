@@ -174,14 +174,11 @@ def test_domain_configuration():
     assert "<WriterLingerDuration>30ms</WriterLingerDuration>" in local
     users = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "CYCLONEDDS_URI": "file:///mine.xml"}
     assert domain_xml(users).endswith(",file:///mine.xml")
+    old = domain_xml({"ROS_LOCALHOST_ONLY": "1", "ROS_STATIC_PEERS": "10.0.0.1"})
+    assert "10.0.0.1" not in old
     peers = domain_xml({"ROS_STATIC_PEERS": "10.0.0.1;robot.local"})
     assert '<Peer address="10.0.0.1"/><Peer address="robot.local"/>' in peers
     assert domain_xml({"ROS_AUTOMATIC_DISCOVERY_RANGE": "SYSTEM_DEFAULT"}) == ""
-
-
-def test_a_machine_with_nothing_but_loopback_uses_it(monkeypatch):
-    monkeypatch.setattr("embedded_ros.transport.cyclone_config.has_network", lambda: False)
-    assert 'address="127.0.0.1"' in domain_xml({})
 
 
 def test_names_on_the_wire():

@@ -2,9 +2,15 @@
 """How processes end, and how they find each other."""
 
 import signal
+import time
 
 import pytest
 from std_msgs.msg import String
+
+import embedded_ros
+
+EMBEDDED = embedded_ros.enable()
+embedded_only = pytest.mark.skipif(not EMBEDDED, reason="a promise of the embedded runtime")
 
 
 @pytest.mark.parametrize(
@@ -53,3 +59,75 @@ def test_discovery_switched_off_isolates_a_process(node, spin, program):
     assert "talker" not in node.get_node_names()
     open_one.process.send_signal(signal.SIGINT)
     assert open_one.finish()[0] == 0
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("how", ["future", "message", "sleep", "service", "rate", "call"])
+def test_signals_end_whatever_waits(program, how, number):
+    waiting = program("waiting.py", how)
+    waiting.wait_for_line("ready")
+    waiting.process.send_signal(number)
+    code, _, err = waiting.finish()
+    assert code == 0, err
+    assert "Traceback" not in err
+
+
+@embedded_only  # real rclpy leaves a second signal to chance
+@pytest.mark.parametrize("pause", [0.0, 0.01, 0.03])
+@pytest.mark.parametrize(
+    "numbers", [(signal.SIGINT,) * 2, (signal.SIGTERM,) * 2, (signal.SIGTERM, signal.SIGINT)]
+)
+def test_a_second_signal_while_ending_changes_nothing(program, numbers, pause):
+    talker = program("talker.py")
+    talker.wait_for_line("ready")
+    for number in numbers:
+        talker.process.send_signal(number)
+        time.sleep(pause)
+    code, _, err = talker.finish()
+    assert code == 0, err
+    assert "Traceback" not in err
+
+
+def test_a_killed_process_is_forgotten_and_can_come_back(node, spin, program):
+    limit = 8 if EMBEDDED else 30  # s; real ROS 2 forgets after ten and more
+    got = []
+    node.create_subscription(String, "chatter", got.append, 10)
+    for _ in range(3):
+        talker = program("talker.py")
+        seen = len(got)
+        assert spin(lambda: "talker" in node.get_node_names() and len(got) > seen, node)  # noqa: B023
+        talker.process.kill()
+        assert spin(lambda: "talker" not in node.get_node_names(), node, limit=limit)
+        assert node.count_publishers("chatter") == 0
+
+
+def test_a_process_that_stood_still_comes_back(node, spin, program):
+    got = []
+    node.create_subscription(String, "chatter", got.append, 10)
+    talker = program("talker.py")
+    assert spin(lambda: got, node)
+    talker.process.send_signal(signal.SIGSTOP)
+    assert spin(lambda: "talker" not in node.get_node_names(), node, limit=30)
+    seen = len(got)
+    talker.process.send_signal(signal.SIGCONT)
+    assert spin(lambda: "talker" in node.get_node_names() and len(got) > seen, node)
+
+
+@pytest.mark.parametrize("bad", ["abc", "-1", "233"])
+def test_a_bad_domain_is_named(program, bad):
+    code, _, err = program("talker.py", ROS_DOMAIN_ID=bad).finish()
+    assert code != 0
+    assert not EMBEDDED or f"ROS_DOMAIN_ID is '{bad}'" in err
+
+
+@embedded_only  # real ROS 2 warns and takes LOCALHOST
+def test_a_bad_discovery_range_is_named(program):
+    code, _, err = program("talker.py", ROS_AUTOMATIC_DISCOVERY_RANGE="NEAR").finish()
+    assert code != 0
+    assert "ROS_AUTOMATIC_DISCOVERY_RANGE is 'NEAR'; it must be one of OFF, LOCALHOST" in err
+
+
+def test_settings_the_middleware_refuses_end_init(program):
+    code, _, err = program("talker.py", CYCLONEDDS_URI="file:///no/such/file.xml").finish()
+    assert code != 0
+    assert "no/such/file" in err

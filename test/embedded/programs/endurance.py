@@ -6,7 +6,6 @@ serves; both make a node and everything in it every second and destroy it again.
 ``ROLE seconds messages kilobytes threads files`` ten times, which is what must not grow.
 """
 
-import sys
 import threading
 import time
 from pathlib import Path
