@@ -67,6 +67,10 @@ class Duration:
 
     __hash__ = None  # type: ignore[assignment]
 
+    def get_c_duration(self) -> Duration:
+        """This duration, which needs no other form here."""
+        return self
+
     def to_msg(self) -> Any:
         """As builtin_interfaces/msg/Duration; an infinite duration becomes the largest message
         value.

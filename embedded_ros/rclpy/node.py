@@ -9,12 +9,18 @@ from typing import Any
 from embedded_ros.interfaces.registry import registry
 
 from ._rclpy_pybind11 import NodeNameNonExistentError
-from .callback_groups import CallbackGroup
+from .callback_groups import (
+    CallbackGroup,
+    MutuallyExclusiveCallbackGroup,
+    ReentrantCallbackGroup,
+)
+from .client import Client
 from .clock import Clock, ROSClock
 from .destroyable import Destroyable
 from .exceptions import NotInitializedException
 from .executors import Executor
 from .expand_topic_name import expand_topic_name
+from .guard_condition import GuardCondition
 from .impl.arguments import NodeArguments, parse_arguments
 from .impl.rcutils_logger import RcutilsLogger
 from .impl.rosout import Rosout
@@ -25,8 +31,12 @@ from .node_graph import GraphViewer
 from .node_parameters import ParameterHolder
 from .parameter import Parameter
 from .parameter_service import ParameterService
-from .qos import qos_profile_parameter_events
+from .publisher import Publisher
+from .qos import QoSProfile, qos_profile_parameter_events
+from .service import Service
+from .subscription import Subscription
 from .time_source import TimeSource
+from .timer import Rate, Timer
 from .type_description_service import TypeDescriptionService
 from .utilities import get_default_context
 from .validate_full_topic_name import validate_full_topic_name
@@ -34,7 +44,28 @@ from .validate_namespace import validate_namespace
 from .validate_node_name import validate_node_name
 from .validate_topic_name import validate_topic_name
 
-__all__ = ["Node", "NodeNameNonExistentError"]
+# Programs import more from here than what is defined here.
+__all__ = [
+    "HIDDEN_NODE_PREFIX",
+    "CallbackGroup",
+    "Client",
+    "Clock",
+    "GuardCondition",
+    "MutuallyExclusiveCallbackGroup",
+    "Node",
+    "NodeNameNonExistentError",
+    "Parameter",
+    "Publisher",
+    "QoSProfile",
+    "Rate",
+    "ReentrantCallbackGroup",
+    "Service",
+    "Subscription",
+    "Timer",
+]
+
+#: tools hide nodes whose names start so
+HIDDEN_NODE_PREFIX = "_"
 
 
 class Node(ParameterHolder, EntityHolder, GraphViewer, Destroyable):

@@ -79,7 +79,7 @@ class TimeSource:
         if enabled and self._clock_sub is None:
             qos = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
             self._clock_sub = node.create_subscription(
-                rosgraph_msgs.msg.Clock, CLOCK_TOPIC, self._on_clock, qos
+                rosgraph_msgs.msg.Clock, CLOCK_TOPIC, self.clock_callback, qos
             )
         elif not enabled and self._clock_sub is not None:
             node.destroy_subscription(self._clock_sub)
@@ -107,7 +107,8 @@ class TimeSource:
         """Feed a clock no longer."""
         self._clocks.remove(clock)
 
-    def _on_clock(self, message: Any) -> None:
+    def clock_callback(self, message: Any) -> None:
+        """Set the clocks to the time of a message of /clock."""
         before, node = self._last, self._get_node()
         self._last = Time.from_msg(message.clock)
         for clock in self._clocks:

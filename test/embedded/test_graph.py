@@ -4,6 +4,7 @@
 import time
 
 import pytest
+import rclpy.node
 from geometry_msgs.msg import PoseArray, TransformStamped
 from rclpy.exceptions import (
     InvalidHandle,
@@ -89,6 +90,13 @@ def test_node_subclasses(context):
     node = Own()
     assert node.get_parameter("p").value == 1
     node.destroy_node()
+
+
+def test_the_node_module_knows_what_programs_import_from_it():
+    for name in ("Publisher", "Subscription", "Client", "Service", "Timer", "Rate", "QoSProfile"):
+        assert getattr(rclpy.node, name).__name__ == name
+    assert rclpy.node.HIDDEN_NODE_PREFIX == "_"
+    assert issubclass(rclpy.node.ReentrantCallbackGroup, rclpy.node.CallbackGroup)
 
 
 def test_publishers_take_message_classes_only(node):
