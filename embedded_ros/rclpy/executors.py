@@ -15,7 +15,6 @@ from embedded_ros.transport import Waiter
 
 from .event_handler import POLL_PERIOD
 from .exceptions import InvalidHandle
-from .guard_condition import GuardCondition
 from .impl.executor_parts import (
     ConditionReachedException,
     Entities,
@@ -25,9 +24,8 @@ from .impl.executor_parts import (
     TimeoutObject,
     WorkTracker,
 )
-from .impl.queued import Work, await_or_execute
+from .impl.queued import Work
 from .task import Future, Task
-from .timer import Timer
 from .utilities import get_default_context, timeout_sec_to_nsec
 
 if TYPE_CHECKING:
@@ -149,19 +147,26 @@ class Executor:
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
         """Wait for one callback and run it; None or a negative timeout waits forever."""
-        raise NotImplementedError()
+        self._spin_once_impl(timeout_sec)
 
     def spin_once_until_future_complete(
         self, future: Future, timeout_sec: float | TimeoutObject | None = None
     ) -> None:
         """As :meth:`spin_once`, but return as soon as ``future`` is done."""
+        self._spin_once_impl(timeout_sec, future.done)
+
+    def _spin_once_impl(
+        self,
+        timeout_sec: float | TimeoutObject | None = None,
+        wait_condition: Callable[[], bool] = lambda: False,
+    ) -> None:
         raise NotImplementedError()
 
     def can_execute(self, entity: Any) -> bool:
         """Whether a callback of the entity may run now."""
         return not entity._executor_event and entity.callback_group.can_execute(entity)
 
-    def _make_task(self, entity: Any, node: Node, take: Callable[[], Work | None]) -> Task:
+    def _claim(self, entity: Any, node: Node) -> tuple[Task, Any, Any]:
         """A task that claims the callback group, takes the entity's work and runs it."""
         entity._executor_event = True
 
@@ -173,7 +178,7 @@ class Executor:
                 return
             try:
                 try:
-                    work = take()
+                    work: Work | None = entity.take_work()
                 except InvalidHandle:
                     # Destroyed between becoming ready and being run.
                     work = None
@@ -192,25 +197,7 @@ class Executor:
         task._queued = True
         with self._tasks_lock:
             self._tasks.append((task, entity, node))
-        return task
-
-    @staticmethod
-    def _take_timer(timer: Any) -> Work | None:
-        handle = timer.handle
-        if handle.is_canceled() or timer.callback is None:
-            return None
-        handle.call_timer()
-        return lambda: await_or_execute(timer.callback)
-
-    @staticmethod
-    def _take_guard(guard: Any) -> Work | None:
-        guard._executor_triggered = False
-        return (lambda: await_or_execute(guard.callback)) if guard.callback is not None else None
-
-    @staticmethod
-    def _take_waitable(waitable: Any) -> Work | None:
-        data = waitable.take_data()
-        return lambda: waitable.execute(data)
+        return task, entity, node
 
     def _gather(self, nodes: list[Node]) -> Entities:
         """The entities of the nodes, gathered anew only after a change."""
@@ -230,22 +217,11 @@ class Executor:
             waitables = entities.events + waitables
         for waitable, node in waitables:
             if self.can_execute(waitable) and waitable.is_ready(entities.wait_set):
-                yield self._claim(waitable, node, lambda w=waitable: self._take_waitable(w))  # type: ignore[misc]
+                yield self._claim(waitable, node)
         for place in entities.candidates():
             entity, node = entities.others[place]
-            if isinstance(entity, Timer):
-                if not entity._destroyed and self.can_execute(entity) and entity.is_ready():
-                    yield self._claim(entity, node, lambda t=entity: self._take_timer(t))  # type: ignore[misc]
-            elif isinstance(entity, GuardCondition):
-                if entity._executor_triggered and self.can_execute(entity):
-                    yield self._claim(entity, node, lambda g=entity: self._take_guard(g))  # type: ignore[misc]
-            elif entity.has_work() and self.can_execute(entity):
-                yield self._claim(entity, node, entity.take_work)
-
-    def _claim(
-        self, entity: Any, node: Node, take: Callable[[], Work | None]
-    ) -> tuple[Task, Any, Any]:
-        return self._make_task(entity, node, take), entity, node
+            if entity.has_work() and self.can_execute(entity):
+                yield self._claim(entity, node)
 
     def _pending_tasks(self, nodes: list[Node]) -> Iterator[tuple[Task, Any, Any]]:
         """Tasks made by users and coroutines that gave way."""
@@ -368,14 +344,6 @@ class SingleThreadedExecutor(Executor):
         if task.done():
             task.result()
 
-    def spin_once(self, timeout_sec: float | None = None) -> None:
-        self._spin_once_impl(timeout_sec)
-
-    def spin_once_until_future_complete(
-        self, future: Future, timeout_sec: float | TimeoutObject | None = None
-    ) -> None:
-        self._spin_once_impl(timeout_sec, future.done)
-
 
 class MultiThreadedExecutor(Executor):
     """Runs callbacks in a pool of threads."""
@@ -415,14 +383,6 @@ class MultiThreadedExecutor(Executor):
             if future.done():
                 self._futures.remove(future)
                 future.result()
-
-    def spin_once(self, timeout_sec: float | None = None) -> None:
-        self._spin_once_impl(timeout_sec)
-
-    def spin_once_until_future_complete(
-        self, future: Future, timeout_sec: float | TimeoutObject | None = None
-    ) -> None:
-        self._spin_once_impl(timeout_sec, future.done)
 
     def shutdown(self, timeout_sec: float | None = None) -> bool:
         finished = super().shutdown(timeout_sec)

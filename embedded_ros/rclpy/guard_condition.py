@@ -4,9 +4,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from .destroyable import Destroyable
+from .impl.queued import Work, await_or_execute
 from .utilities import get_default_context
 
 
@@ -33,3 +35,12 @@ class GuardCondition(Destroyable):
             self._wake()
 
     trigger_guard_condition = trigger
+
+    def has_work(self) -> bool:
+        """Whether it was triggered."""
+        return self._executor_triggered
+
+    def take_work(self) -> Work | None:
+        """Forget the trigger, and return what is to be run."""
+        self._executor_triggered = False
+        return None if self.callback is None else partial(await_or_execute, self.callback)

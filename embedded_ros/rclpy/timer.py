@@ -5,11 +5,13 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from .clock import Clock
 from .destroyable import Destroyable
 from .exceptions import ROSInterruptException
+from .impl.queued import Work, await_or_execute
 from .utilities import get_default_context
 
 
@@ -90,6 +92,17 @@ class Timer(Destroyable):
     def time_until_next_call(self) -> int | None:
         """Nanoseconds until the next call, negative when overdue, None when canceled."""
         return None if self.handle._canceled else self._next_call - self._clock._now()
+
+    def has_work(self) -> bool:
+        """Whether an executor is to call back."""
+        return not self._destroyed and self.is_ready()
+
+    def take_work(self) -> Work | None:
+        """Note that the callback is being called, and return what is to be run."""
+        if self.handle._canceled:
+            return None
+        self.call_timer()
+        return None if self.callback is None else partial(await_or_execute, self.callback)
 
     def call_timer(self) -> None:
         """Note that the callback is being called, and find the next time: the first multiple that

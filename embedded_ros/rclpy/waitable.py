@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 
@@ -74,6 +76,10 @@ class Waitable:
     def take_data(self) -> Any:
         """Fetch what :meth:`execute` is to work on."""
         raise NotImplementedError("Must be implemented by subclass")
+
+    def take_work(self) -> Callable[[], Any]:
+        """Fetch data, and return what is to be run for it."""
+        return partial(self.execute, self.take_data())
 
     async def execute(self, taken_data: Any) -> None:
         """Do the work."""
