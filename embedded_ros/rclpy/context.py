@@ -18,7 +18,6 @@ from embedded_ros.transport.graph import Graph
 
 from ._rclpy_pybind11 import RCLError
 from .destroyable import Destroyable
-from .exceptions import NotInitializedException
 from .impl.arguments import RosArguments, parse_arguments
 
 if TYPE_CHECKING:
@@ -223,11 +222,6 @@ class Context:
         if not self._initialized:
             raise RuntimeError("Context must be initialized before it can have a domain id")
         return self._domain_id
-
-    def check(self, what: str) -> None:
-        """:raises NotInitializedException: the context is not initialised, or shut down."""
-        if not self._is_ok:
-            raise NotInitializedException(what)
 
     def __enter__(self) -> Context:
         self.init()

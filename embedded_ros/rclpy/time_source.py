@@ -103,10 +103,6 @@ class TimeSource:
         self._clocks.append(clock)
         self._apply(clock)
 
-    def detach_clock(self, clock: ROSClock) -> None:
-        """Feed a clock no longer."""
-        self._clocks.remove(clock)
-
     def clock_callback(self, message: Any) -> None:
         """Set the clocks to the time of a message of /clock."""
         before, node = self._last, self._get_node()
