@@ -328,8 +328,8 @@ def endless(monkeypatch, participant_class):
 @pytest.mark.timeout(40)
 def test_samples_end_a_wait(join, endless):
     participant = join()
-    writer = participant.create_writer(TOPIC, TYPE, HASH, Qos())
-    reader = participant.create_reader(TOPIC, TYPE, HASH, Qos())
+    writer = participant.create_writer(TOPIC, TYPE, HASH, Qos(keep_all=True))
+    reader = participant.create_reader(TOPIC, TYPE, HASH, Qos(keep_all=True))
     assert connected([writer, reader])
     waiter = participant.create_waiter()
     waiter.set_readers({reader})
