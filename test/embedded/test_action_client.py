@@ -244,6 +244,7 @@ def test_calls_that_block(bench, spinning):
     assert goal.get_result().status == GoalStatus.STATUS_CANCELED
 
 
+@pytest.mark.processes
 def test_a_server_in_another_process(program, client, finish, spin, executor):
     server = program("counter.py")
     assert client.wait_for_server(30)
@@ -262,6 +263,7 @@ def test_a_server_in_another_process(program, client, finish, spin, executor):
     assert spin(lambda: not client.server_is_ready(), executor=executor)
 
 
+@pytest.mark.processes
 def test_a_server_that_is_killed_with_a_goal(program, client, finish, spin, executor):
     server = program("counter.py")
     assert client.wait_for_server(30)
