@@ -151,7 +151,7 @@ def test_a_node_runs_alone_and_ends_well(environment):
 
 @pytest.mark.long
 @pytest.mark.timeout(600)
-@pytest.mark.parametrize("folder", ["embedded", "nodes"])
+@pytest.mark.parametrize("folder", ["embedded", "nodes", "ros_cli"])
 def test_the_same_tests_hold_within_one_process(environment, folder):
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-m", "not long"]
     done = subprocess.run(
