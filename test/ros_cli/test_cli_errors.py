@@ -45,6 +45,8 @@ PUB = ("topic", "pub", "-1", "-w", "0", "/x")
         ((*PUB, "std_msgs/String", "dat: 1"), "dat: unknown key (did you mean 'data'?); valid"),
         ((*PUB, "std_msgs/UInt8", "data: 300"), "data: 300 is not allowed; must be uint8"),
         ((*PUB, "std_msgs/UInt8", "data: high"), "data: 'high' is not allowed; must be uint8"),
+        ((*PUB, "std_msgs/Int32", "data: 3.7"), "data: 3.7 is not allowed; must be int32"),
+        ((*PUB, "std_msgs/Bool", "data: maybe"), "data: 'maybe' is not allowed; must be boolean"),
         (
             (*PUB, "geometry_msgs/PoseArray", "poses: [{}, {position: {x: far}}]"),
             "poses[1].position.x: 'far' is not allowed; must be double",

@@ -153,6 +153,11 @@ def _check(message: Any, values: dict[str, Any], place: str, expand: dict[str, b
                 if not isinstance(item, dict):
                     raise InvalidValue(f"{where}[{index}]", item, f"a mapping ({fields[key]})")
                 _check(element(), item, f"{where}[{index}]", expand)
+        # rosidl_runtime_py would make True of any text, and cut numbers.
+        if (isinstance(part, bool) and value not in (True, False)) or (
+            type(part) is int and isinstance(value, float) and not value.is_integer()
+        ):
+            raise InvalidValue(where, value, fields[key])
         try:
             # A copy, as rosidl_runtime_py puts messages into the lists that it is given.
             set_message_fields(type(message)(), {key: copy.deepcopy(value)}, **expand)
