@@ -274,7 +274,9 @@ def test_a_server_that_is_killed_with_a_goal(program, client, finish, spin, exec
     server.process.kill()
     assert spin(lambda: not client.server_is_ready(), limit=60, executor=executor)
     assert not result.done()
-    program("counter.py")
+    server = program("counter.py")
     assert client.wait_for_server(30)
     goal = finish(client.send_goal_async(Goal(order=2)))
     assert list(finish(goal.get_result_async()).result.sequence) == [1, 2]
+    server.process.send_signal(signal.SIGINT)
+    assert server.finish()[0] == 0

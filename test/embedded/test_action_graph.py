@@ -75,7 +75,7 @@ def test_the_graph_shows_actions(make_node, ends, spin):
     ends(ActionClient, first, "~/own")
     ends(ActionClient, second, "one/count")
     both = [("/one/count", [TYPE]), ("/one/first/own", [TYPE])]
-    assert spin(lambda: sorted(get_action_names_and_types(second)) == both)
+    assert spin(lambda: all(pair in get_action_names_and_types(second) for pair in both))
     servers, clients = (
         get_action_server_names_and_types_by_node,
         get_action_client_names_and_types_by_node,
@@ -144,4 +144,4 @@ def test_names_may_be_remapped(make_node, ends, spin):
     ends(ActionServer, server, "count", print)
     client = ends(ActionClient, make_node("client"), "total")
     assert client.wait_for_server(15)
-    assert spin(lambda: get_action_names_and_types(server) == [("/total", [TYPE])])
+    assert spin(lambda: ("/total", [TYPE]) in get_action_names_and_types(server))

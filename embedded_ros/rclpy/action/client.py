@@ -127,22 +127,23 @@ class ActionClient(ActionEnd):
         self._statuses: dict[bytes, int] = {}
         self._feedback_callbacks: dict[bytes, Callable[[Any], Any]] = {}
         types = action_type.Impl
-        self._goals = self._client(types.SendGoalService, "send_goal", goal_service_qos_profile)
-        self._cancels = self._client(
-            types.CancelGoalService, "cancel_goal", cancel_service_qos_profile
-        )
-        self._results = self._client(
-            types.GetResultService, "get_result", result_service_qos_profile
-        )
         self._feedback = self._subscribe(
             types.FeedbackMessage, "feedback", self._on_feedback, feedback_sub_qos_profile
         )
         self._status = self._subscribe(
             types.GoalStatusMessage, "status", self._on_status, status_sub_qos_profile
         )
+        self._goals, self._cancels, self._results = (
+            self._connect(name, service, qos)
+            for name, service, qos in (
+                ("send_goal", types.SendGoalService, goal_service_qos_profile),
+                ("cancel_goal", types.CancelGoalService, cancel_service_qos_profile),
+                ("get_result", types.GetResultService, result_service_qos_profile),
+            )
+        )
         node.add_waitable(self)
 
-    def _client(self, srv_type: Any, name: str, qos: QoSProfile) -> Client:
+    def _connect(self, name: str, srv_type: Any, qos: QoSProfile) -> Client:
         client = self._node.create_client(
             srv_type, self._prefix + name, qos_profile=qos, callback_group=self.callback_group
         )

@@ -16,27 +16,18 @@ from .._rclpy_pybind11 import RCLError
 from ..callback_groups import CallbackGroup
 from ..constants import S_TO_NS
 from ..event_handler import PublisherEventCallbacks
-from ..exceptions import InvalidHandle
-from ..impl.action_end import ActionEnd, HeaderService
+from ..impl.action_end import ActionEnd, AnsweringService
 from ..impl.queued import await_or_execute
 from ..impl.server_goal import GoalEvent, ServerGoalHandle
+from ..publisher import Publisher
 from ..qos import QoSProfile, qos_profile_action_status_default, qos_profile_services_default
 from ..waitable import NumberOfEntities
 
 if TYPE_CHECKING:
     from ..node import Node
 
-__all__ = [
-    "ActionServer",
-    "CancelResponse",
-    "GoalEvent",
-    "GoalResponse",
-    "RCLError",
-    "ServerGoalHandle",
-    "default_cancel_callback",
-    "default_goal_callback",
-    "default_handle_accepted_callback",
-]
+_Callback = Callable[[Any], Any]
+_Respond = Callable[[Any], bool]
 
 
 class GoalResponse(Enum):
@@ -80,12 +71,12 @@ class ActionServer(ActionEnd):
         node: Node,
         action_type: Any,
         action_name: str,
-        execute_callback: Callable[[ServerGoalHandle], Any],
+        execute_callback: _Callback,
         *,
         callback_group: CallbackGroup | None = None,
-        goal_callback: Callable[[Any], Any] | None = default_goal_callback,
-        handle_accepted_callback: Callable[[Any], Any] | None = default_handle_accepted_callback,
-        cancel_callback: Callable[[Any], Any] | None = default_cancel_callback,
+        goal_callback: _Callback | None = default_goal_callback,
+        handle_accepted_callback: _Callback | None = default_handle_accepted_callback,
+        cancel_callback: _Callback | None = default_cancel_callback,
         goal_service_qos_profile: QoSProfile = qos_profile_services_default,
         result_service_qos_profile: QoSProfile = qos_profile_services_default,
         cancel_service_qos_profile: QoSProfile = qos_profile_services_default,
@@ -116,36 +107,30 @@ class ActionServer(ActionEnd):
         self._result_timeout = int(result_timeout * S_TO_NS)
         self._next_expiry: int | None = None
         self._goal_handles: dict[bytes, ServerGoalHandle] = {}
+        # Publishers first: another thread may be spinning the node, and services call back.
         types = action_type.Impl
-        self._goals = self._serve(
-            types.SendGoalService, "send_goal", self._on_goal, goal_service_qos_profile
-        )
-        self._cancels = self._serve(
-            types.CancelGoalService, "cancel_goal", self._on_cancel, cancel_service_qos_profile
-        )
-        self._results = self._serve(
-            types.GetResultService, "get_result", self._on_get_result, result_service_qos_profile
-        )
-        self._feedback = self._publisher(
-            types.FeedbackMessage, "feedback", feedback_pub_qos_profile
-        )
-        self._status = self._publisher(types.GoalStatusMessage, "status", status_pub_qos_profile)
+        self._feedback = self._publish(types.FeedbackMessage, "feedback", feedback_pub_qos_profile)
+        self._status = self._publish(types.GoalStatusMessage, "status", status_pub_qos_profile)
+        for name, service, callback, qos in (
+            ("get_result", types.GetResultService, self._on_result, result_service_qos_profile),
+            ("cancel_goal", types.CancelGoalService, self._on_cancel, cancel_service_qos_profile),
+            ("send_goal", types.SendGoalService, self._on_goal, goal_service_qos_profile),
+        ):
+            self._serve(name, service, callback, qos)
         node.add_waitable(self)
 
-    def _serve(self, srv_type: Any, name: str, callback: Any, qos: QoSProfile) -> Any:
-        service = HeaderService(
-            self._node, srv_type, self._prefix + name, callback, self.callback_group, qos
-        )
-        self._destroyers[service] = self._node.destroy_service
-        return self._node._keep(service, self._node._services)
-
-    def _publisher(self, msg_type: Any, name: str, qos: QoSProfile) -> Any:
+    def _publish(self, msg_type: Any, name: str, qos: QoSProfile) -> Publisher:
         quiet = PublisherEventCallbacks(use_default_callbacks=False)
-        publisher = self._node.create_publisher(
-            msg_type, self._prefix + name, qos, event_callbacks=quiet
-        )
+        topic = self._prefix + name
+        publisher = self._node.create_publisher(msg_type, topic, qos, event_callbacks=quiet)
         self._destroyers[publisher] = self._node.destroy_publisher
         return publisher
+
+    def _serve(self, name: str, srv_type: Any, callback: Any, qos: QoSProfile) -> None:
+        full, node = self._prefix + name, self._node
+        service = AnsweringService(node, srv_type, full, callback, self.callback_group, qos)
+        self._destroyers[service] = node.destroy_service
+        node._keep(service, node._services)
 
     @property
     def action_type(self) -> Any:
@@ -157,37 +142,26 @@ class ActionServer(ActionEnd):
 
     # --- what clients ask for
 
-    def _respond(self, what: str, service: Any, header: Any, response: Any) -> bool:
-        try:
-            service.send_response(response, header)
-        except InvalidHandle:
-            self._logger.warning(
-                f"Failed to send {what} response (the server was destroyed meanwhile)"
-            )
-            return False
-        return True
-
-    async def _on_goal(self, request: Any, header: Any) -> None:
+    async def _on_goal(self, request: Any, respond: _Respond) -> None:
         info = GoalInfo(goal_id=request.goal_id)
         key = bytes(request.goal_id.uuid)
         handle: ServerGoalHandle | None = None
         if key not in self._goal_handles:
             answer = await await_or_execute(self._goal_callback, request.goal)
-            if not isinstance(answer, GoalResponse):
+            if answer == GoalResponse.ACCEPT:
+                info.stamp = self._node.get_clock().now().to_msg()
+                handle = ServerGoalHandle(self, info, request.goal)
+                with self._lock:
+                    # The same goal may have come in again while the callback ran.
+                    if self._goal_handles.setdefault(key, handle) is not handle:
+                        handle = None
+            elif not isinstance(answer, GoalResponse):
                 self._logger.warning(
                     "Goal request callback did not return a GoalResponse type. Rejecting goal."
                 )
-            elif answer == GoalResponse.ACCEPT:
-                info.stamp = self._node.get_clock().now().to_msg()
-                handle = ServerGoalHandle(self, info, request.goal)
-                # The same goal may have come in again while the callback ran.
-                if self._goal_handles.setdefault(key, handle) is not handle:
-                    handle = None
-        response = self._action_type.Impl.SendGoalService.Response(
-            accepted=handle is not None, stamp=info.stamp
-        )
-        if self._respond("goal", self._goals, header, response) and handle is not None:
-            await await_or_execute(self._handle_accepted_callback, handle)
+        response = self._action_type.Impl.SendGoalService.Response
+        if respond(response(accepted=handle is not None, stamp=info.stamp)) and handle is not None:
+            await await_or_execute(self._accepted_callback, handle)
 
     def _to_cancel(self, wanted: Any) -> tuple[list[ServerGoalHandle], int]:
         """The goals that a cancel request is about, by the rules of CancelGoal.srv, and its return
@@ -195,68 +169,54 @@ class ActionServer(ActionEnd):
         """
         key, stamp = bytes(wanted.goal_id.uuid), _nanoseconds(wanted)
         with self._lock:
-            goals = list(self._goal_handles.values())
-        cancelable = [
-            goal
-            for goal in goals
-            if goal.status in (GoalStatus.STATUS_ACCEPTED, GoalStatus.STATUS_EXECUTING)
-        ]
-        chosen = [goal for goal in cancelable if bytes(goal.goal_id.uuid) == key]
-        if not any(key):
-            up_to = stamp or 2**63
-        elif stamp:
-            up_to = stamp
-        else:
-            if chosen:
-                return chosen, CancelGoal.Response.ERROR_NONE
+            goals = [goal for goal in self._goal_handles.values() if goal._cancelable]
+        if any(key) and not stamp:
+            goals = [goal for goal in goals if bytes(goal.goal_id.uuid) == key]
+            if goals:
+                return goals, CancelGoal.Response.ERROR_NONE
             if key in self._goal_handles:
                 return [], CancelGoal.Response.ERROR_GOAL_TERMINATED
             return [], CancelGoal.Response.ERROR_UNKNOWN_GOAL_ID
-        older = [g for g in cancelable if _nanoseconds(g._goal_info) <= up_to or g in chosen]
-        return older, CancelGoal.Response.ERROR_NONE
+        if stamp:
+            goals = [
+                goal
+                for goal in goals
+                if _nanoseconds(goal._goal_info) <= stamp or bytes(goal.goal_id.uuid) == key
+            ]
+        return goals, CancelGoal.Response.ERROR_NONE
 
-    async def _on_cancel(self, request: Any, header: Any) -> None:
+    async def _on_cancel(self, request: Any, respond: _Respond) -> None:
         goals, code = self._to_cancel(request.goal_info)
-        canceling = []
+        response = self._action_type.Impl.CancelGoalService.Response(return_code=code)
         for goal in goals:
             if await await_or_execute(self._cancel_callback, goal) == CancelResponse.ACCEPT:
                 try:
                     goal._update_state(GoalEvent.CANCEL_GOAL)
+                    response.goals_canceling.append(goal._goal_info)
                 except RCLError as error:  # it ended while the callback ran
                     self._logger.debug(f"Failed to cancel goal in cancel callback: {error}")
-                else:
-                    canceling.append(goal._goal_info)
-        response = self._action_type.Impl.CancelGoalService.Response(
-            return_code=code, goals_canceling=canceling
-        )
-        self._respond("cancel", self._cancels, header, response)
+        respond(response)
 
-    async def _on_get_result(self, request: Any, header: Any) -> None:
+    async def _on_result(self, request: Any, respond: _Respond) -> None:
         handle = self._goal_handles.get(bytes(request.goal_id.uuid))
-        if handle is None:
-            unknown = self._action_type.Impl.GetResultService.Response(
-                status=GoalStatus.STATUS_UNKNOWN
-            )
-            self._respond("result", self._results, header, unknown)
-            return
-        handle._result.add_done_callback(
-            lambda future: self._respond("result", self._results, header, future.result())
-        )
+        if handle is None:  # a response's status is STATUS_UNKNOWN unless set
+            respond(self._action_type.Impl.GetResultService.Response())
+        else:
+            handle._result.add_done_callback(lambda future: respond(future.result()))
 
     # --- goals
 
     def notify_execute(
-        self, goal_handle: ServerGoalHandle, execute_callback: Callable[[Any], Any] | None
+        self, goal_handle: ServerGoalHandle, execute_callback: _Callback | None
     ) -> None:
         """Have the executor run a goal; use :meth:`ServerGoalHandle.execute`."""
         executor = self._node.executor
         if executor is None:
             raise RuntimeError("a goal can only be executed while its node is in an executor")
-        executor.create_task(
-            self._execute_goal, execute_callback or self._execute_callback, goal_handle
-        )
+        callback = execute_callback or self._execute_callback
+        executor.create_task(self._execute_goal, callback, goal_handle)
 
-    async def _execute_goal(self, callback: Callable[[Any], Any], goal: ServerGoalHandle) -> None:
+    async def _execute_goal(self, callback: _Callback, goal: ServerGoalHandle) -> None:
         try:
             result = await await_or_execute(callback, goal)
         except Exception as error:
@@ -268,10 +228,8 @@ class ActionServer(ActionEnd):
                 f"Goal state not set, assuming aborted. Goal ID: {goal.goal_id.uuid}"
             )
             goal.abort()
-        response = self._action_type.Impl.GetResultService.Response(
-            status=goal.status, result=result
-        )
-        goal._result.set_result(response)
+        response = self._action_type.Impl.GetResultService.Response
+        goal._result.set_result(response(status=goal.status, result=result))
 
     def _publish_status(self) -> None:
         statuses = [
@@ -307,23 +265,19 @@ class ActionServer(ActionEnd):
 
     # --- callbacks
 
-    def register_handle_accepted_callback(
-        self, handle_accepted_callback: Callable[[Any], Any] | None
-    ) -> None:
+    def register_handle_accepted_callback(self, handle_accepted_callback: _Callback | None) -> None:
         """Set what is called with the handle of a new goal; None: execute it at once."""
-        self._handle_accepted_callback = (
-            handle_accepted_callback or default_handle_accepted_callback
-        )
+        self._accepted_callback = handle_accepted_callback or default_handle_accepted_callback
 
-    def register_goal_callback(self, goal_callback: Callable[[Any], Any] | None) -> None:
+    def register_goal_callback(self, goal_callback: _Callback | None) -> None:
         """Set what decides on goals; None: all are accepted."""
         self._goal_callback = goal_callback or default_goal_callback
 
-    def register_cancel_callback(self, cancel_callback: Callable[[Any], Any] | None) -> None:
+    def register_cancel_callback(self, cancel_callback: _Callback | None) -> None:
         """Set what decides on cancel requests; None: all are rejected."""
         self._cancel_callback = cancel_callback or default_cancel_callback
 
-    def register_execute_callback(self, execute_callback: Callable[[Any], Any]) -> None:
+    def register_execute_callback(self, execute_callback: _Callback) -> None:
         """Set what executes goals.
 
         :raises TypeError: it is not callable.
@@ -334,6 +288,7 @@ class ActionServer(ActionEnd):
 
     def destroy(self) -> None:
         """Leave the action; goals that are being executed can no longer be heard of."""
-        for goal in self._goal_handles.values():
-            goal.destroy()
+        with self._lock:
+            for goal in self._goal_handles.values():
+                goal.destroy()
         super().destroy()

@@ -8,10 +8,11 @@ entities, served by its executor in the action's callback group, but no list of 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from ..callback_groups import CallbackGroup
-from ..exceptions import NameValidationException
+from ..exceptions import InvalidHandle, NameValidationException
 from ..service import Service
 from ..type_support import check_for_type_support
 from ..waitable import Waitable
@@ -21,12 +22,25 @@ if TYPE_CHECKING:
     from ..node import Node
 
 
-class HeaderService(Service):
-    """A service whose callback takes a request and its header and sends the response itself."""
+class AnsweringService(Service):
+    """A service whose callback takes a request and a function that sends the response."""
 
     def take_work(self) -> Work | None:
         request, header = self.service_take_request()
-        return None if header is None else lambda: self.callback(request, header)
+        if header is None:
+            return None
+        return lambda: self.callback(request, partial(self._respond, header))
+
+    def _respond(self, header: Any, response: Any) -> bool:
+        """Answer; False when the service was destroyed since the request came."""
+        try:
+            self.send_response(response, header)
+        except InvalidHandle:
+            self._node.get_logger().warning(
+                f"Failed to send a response of '{self.srv_name}': the server was destroyed"
+            )
+            return False
+        return True
 
 
 class ActionEnd(Waitable):

@@ -71,6 +71,10 @@ class ServerGoalHandle:
         return self._state in (ACCEPTED, EXECUTING, CANCELING)
 
     @property
+    def _cancelable(self) -> bool:
+        return self._state in (ACCEPTED, EXECUTING)
+
+    @property
     def is_cancel_requested(self) -> bool:
         """Whether the goal is to end by :meth:`canceled`."""
         return self._state == CANCELING
