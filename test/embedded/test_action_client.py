@@ -263,6 +263,7 @@ def test_a_server_in_another_process(program, client, finish, spin, executor):
     assert spin(lambda: not client.server_is_ready(), executor=executor)
 
 
+@pytest.mark.long
 @pytest.mark.processes
 def test_a_server_that_is_killed_with_a_goal(program, client, finish, spin, executor):
     server = program("counter.py")
