@@ -48,6 +48,7 @@ def __getattr__(name: str) -> Any:
 _ELSEWHERE = {
     "Client": ".impl.wait_set.make_client",
     "EventHandle": ".event_handler.EventHandle",
+    "GoalEvent": ".impl.server_goal.GoalEvent",
     "GuardCondition": ".impl.wait_set.make_guard_condition",
     "Service": ".impl.wait_set.make_service",
     "Subscription": ".impl.wait_set.make_subscription",
