@@ -72,8 +72,10 @@ def open_participant(domain_id: int) -> Participant:
     :raises ValueError: as for :func:`chosen_transport`.
     """
     if chosen_transport() == "local":
+        from .cyclone_config import discovery_range
         from .local import LocalParticipant
 
+        discovery_range(os.environ)  # without effect here, but a mistake all the same
         _say_what_is_missing()
         return LocalParticipant(domain_id)
     from .cyclone import CycloneParticipant
