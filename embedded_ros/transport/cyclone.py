@@ -32,7 +32,6 @@ from cyclonedds.core import (
     WaitSet,
 )
 from cyclonedds.domain import Domain, DomainParticipant
-from cyclonedds.internal import DDS
 from cyclonedds.pub import DataWriter, Publisher
 from cyclonedds.qos import Policy
 from cyclonedds.qos import Qos as CycloneQos
@@ -53,6 +52,14 @@ from .base import (
     user_data,
 )
 from .cyclone_config import domain_xml, settings_in_use
+from .cyclone_library import (
+    Payload,
+    dds_assert_liveliness,
+    dds_waitset_attach,
+    dds_waitset_detach,
+    dds_waitset_wait,
+    dds_write,
+)
 from .cyclone_types import carrier, from_cyclone, to_cyclone
 
 SLICE = 100_000_000
@@ -64,28 +71,6 @@ _ANY = SampleState.Any | ViewState.Any | InstanceState.Any
 _lock = threading.RLock()
 _domains: dict[int, tuple[str, Domain]] = {}
 _participants: dict[int, int] = {}
-
-
-class _Payload(ctypes.Structure):
-    """What the binding's data types take as a sample: an encoded message."""
-
-    _fields_ = (("data", ctypes.c_char_p), ("size", ctypes.c_size_t))
-
-
-def _function(name: str, *arguments: Any) -> Any:
-    """A function of the library; indexing gives one of our own, not that which the binding set."""
-    function = DDS._dll_handle[name]
-    function.argtypes = arguments
-    return function
-
-
-_write = _function("dds_write", ctypes.c_int32, ctypes.POINTER(_Payload))
-_assert_liveliness = _function("dds_assert_liveliness", ctypes.c_int32)
-_attach = _function("dds_waitset_attach", ctypes.c_int32, ctypes.c_int32, ctypes.c_ssize_t)
-_detach = _function("dds_waitset_detach", ctypes.c_int32, ctypes.c_int32)
-_wait = _function(
-    "dds_waitset_wait", ctypes.c_int32, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_int64
-)
 
 
 def _enter_domain(domain_id: int) -> None:
@@ -137,7 +122,7 @@ class CycloneWriter(Writer):
     def write(self, payload: bytes) -> None:
         if rest := len(payload) % 4:
             payload += bytes(4 - rest)
-        result = _write(self._writer._ref, _Payload(payload, len(payload)))
+        result = dds_write(self._writer._ref, Payload(payload, len(payload)))
         if result == DDSException.DDS_RETCODE_TIMEOUT:
             raise TimeoutError("a reader takes nothing")
         if result < 0:
@@ -168,7 +153,7 @@ class CycloneWriter(Writer):
                 return False
 
     def assert_liveliness(self) -> None:
-        result = _assert_liveliness(self._writer._ref)
+        result = dds_assert_liveliness(self._writer._ref)
         if result < 0:
             raise DDSException(result, "while asserting liveliness")
 
@@ -268,7 +253,7 @@ class CycloneWaiter(Waiter):
     def __init__(self, owner: CycloneParticipant) -> None:
         self._set: Any = WaitSet(owner.participant)
         self._guard: Any = GuardCondition(owner.participant)
-        _attach(self._set._ref, self._guard._ref, 0)
+        dds_waitset_attach(self._set._ref, self._guard._ref, 0)
         self._readers: dict[int, Reader] = {}  # by the handle of their condition
 
     def set_readers(self, readers: set[Reader]) -> None:
@@ -279,7 +264,7 @@ class CycloneWaiter(Waiter):
             for reader in readers - present:
                 if isinstance(reader, CycloneReader) and reader.condition is not None and self._set:
                     handle = reader.condition._ref
-                    _attach(self._set._ref, handle, handle)
+                    dds_waitset_attach(self._set._ref, handle, handle)
                     reader._waiters.add(self)
                     self._readers[handle] = reader
 
@@ -288,7 +273,7 @@ class CycloneWaiter(Waiter):
         if isinstance(reader, CycloneReader) and reader.condition is not None:
             handle = reader.condition._ref
             if self._readers.pop(handle, None) is not None and self._set:
-                _detach(self._set._ref, handle)
+                dds_waitset_detach(self._set._ref, handle)
             reader._waiters.discard(self)
 
     def wait(self, timeout: int | None) -> list[Reader]:
@@ -299,7 +284,7 @@ class CycloneWaiter(Waiter):
         found = (ctypes.c_ssize_t * _MANY)()
         # A participant that was closed meanwhile takes its wait sets along and ends their waits:
         # the count is negative then.
-        count = _wait(wait_set._ref, found, _MANY, limit)
+        count = dds_waitset_wait(wait_set._ref, found, _MANY, limit)
         handles = found[: max(count, 0)]
         if 0 in handles or count > _MANY:
             with contextlib.suppress(DDSException):

@@ -47,8 +47,8 @@ def main():
     rclpy.init()
     node = rclpy.create_node("waiting")
     node.create_timer(0.1, lambda: None)
-    print("ready", flush=True)
     try:
+        print("ready", flush=True)
         wait(remove_ros_args()[1], node)
     except (KeyboardInterrupt, ExternalShutdownException, ROSInterruptException):
         pass

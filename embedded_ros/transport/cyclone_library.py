@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Functions of the Cyclone DDS library that are called past its Python binding.
+
+By ctypes, which lets other threads of Python run meanwhile; the binding's write does not.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from typing import Any
+
+from cyclonedds.internal import DDS
+
+
+class Payload(ctypes.Structure):
+    """What the binding's data types take as a sample: an encoded message."""
+
+    _fields_ = (("data", ctypes.c_char_p), ("size", ctypes.c_size_t))
+
+
+def _function(name: str, *arguments: Any) -> Any:
+    # Indexing gives a function of our own, not that on which the binding set other types.
+    function = DDS._dll_handle[name]
+    function.argtypes = arguments
+    return function
+
+
+_entity = ctypes.c_int32
+dds_write = _function("dds_write", _entity, ctypes.POINTER(Payload))
+dds_assert_liveliness = _function("dds_assert_liveliness", _entity)
+dds_waitset_attach = _function("dds_waitset_attach", _entity, _entity, ctypes.c_ssize_t)
+dds_waitset_detach = _function("dds_waitset_detach", _entity, _entity)
+dds_waitset_wait = _function(
+    "dds_waitset_wait", _entity, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_int64
+)
