@@ -24,7 +24,7 @@ from .impl.executor_parts import (
     TimeoutObject,
     WorkTracker,
 )
-from .impl.queued import Work
+from .impl.queued import Work, await_or_execute
 from .task import Future, Task
 from .utilities import get_default_context, timeout_sec_to_nsec
 
@@ -40,6 +40,7 @@ __all__ = [
     "SingleThreadedExecutor",
     "TimeoutException",
     "TimeoutObject",
+    "await_or_execute",
 ]
 
 
