@@ -4,9 +4,11 @@
 import signal
 import subprocess
 import sys
+import threading
 
 import pytest
 from std_msgs.msg import String
+from std_srvs.srv import SetBool
 
 pytestmark = pytest.mark.processes
 
@@ -35,6 +37,17 @@ def test_signals_end_endless_commands_quietly(start_ccr, talking, words, line, n
     process.send_signal(number)
     _, err = process.communicate(timeout=30)
     assert (process.returncode, err) == (code, "")
+
+
+def test_a_signal_ends_a_call_that_gets_no_answer(start_ccr, peer):
+    released = threading.Event()
+    peer.create_service(SetBool, "/slow", lambda request, response: released.wait() and response)
+    process = start_ccr("service", "call", "/slow", "std_srvs/srv/SetBool")
+    assert process.stdout.readline().startswith("requester: making request: ")
+    process.send_signal(signal.SIGTERM)
+    out, err = process.communicate(timeout=30)
+    released.set()
+    assert (process.returncode, out, err) == (143, "\n", "")
 
 
 def test_hz_counts_what_passes_its_filter(start_ccr, talking):

@@ -137,6 +137,8 @@ def run_call(args: argparse.Namespace) -> None:
             print(f"requester: making request: {request!r}\n")
             response = client.call_async(request)
             rclpy.spin_until_future_complete(node, response)
+            if not response.done():  # a signal has ended rclpy
+                return
             print(f"response:\n{response.result()!r}\n")
             if args.rate is None:
                 return
