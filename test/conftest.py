@@ -30,10 +30,18 @@ os.environ["ROS_PYTHON_CHECK_FIELDS"] = "1"  # real rclpy checks no field types 
 enable_ros()
 
 
-def pytest_collection_modifyitems(items):
-    """Leave out what the transport in use cannot do."""
+def pytest_addoption(parser):
+    """Offer what takes too long for every run."""
+    parser.addoption("--soak", action="store_true", help="run the tests that take ten minutes")
+
+
+def pytest_collection_modifyitems(config, items):
+    """Leave out what takes ten minutes, and what the transport in use cannot do."""
     import rclpy
 
+    for item in items:
+        if item.get_closest_marker("soak") and not config.getoption("--soak"):
+            item.add_marker(pytest.mark.skip(reason="takes ten minutes; --soak runs it"))
     if rclpy.get_rmw_implementation_identifier() == "embedded_local":
         skip = pytest.mark.skip(reason="nodes of other processes are not reached")
         for item in items:

@@ -72,6 +72,7 @@ def test_a_slow_callback_holds_up_its_group_only(node, threads):
         release.set()
 
 
+@pytest.mark.processes
 def test_a_process_that_stands_still_ends_no_writer(node, spin, program):
     """A history that keeps all is full at some time when somebody takes nothing."""
     everything = QoSProfile(history=HistoryPolicy.KEEP_ALL, depth=1)
@@ -99,15 +100,21 @@ def test_a_process_that_stands_still_ends_no_writer(node, spin, program):
     node.destroy_timer(timer)
 
 
-@pytest.mark.long
-@pytest.mark.timeout(300)
+@pytest.mark.processes
+@pytest.mark.parametrize(
+    ("seconds", "rate"),
+    [
+        pytest.param(60, 500, marks=[pytest.mark.long, pytest.mark.timeout(300)]),
+        pytest.param(600, 100, marks=[pytest.mark.soak, pytest.mark.timeout(1200)]),
+    ],
+)
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
-def test_nothing_grows_under_traffic(program):
-    """``programs/endurance.py ROLE 600 100`` twice by hand is ten minutes of the same."""
-    ends = [program("endurance.py", role, "60", "500") for role in ("answer", "ask")]
+def test_nothing_grows_under_traffic(program, seconds, rate):
+    ends = [program("endurance.py", role, str(seconds), str(rate)) for role in ("answer", "ask")]
     for end in ends:
-        code, out, err = end.finish(limit=200)
+        code, out, err = end.finish(limit=2 * seconds + 80)
         assert code == 0, err
+        print(out)
         rows = [list(map(int, line.split()[1:])) for line in out.splitlines()]
         assert len(rows) == 10
         assert rows[-1][1] > 2000  # messages

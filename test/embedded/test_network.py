@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.processes
 ROOT = Path(__file__).parents[2]
 TALKER, LISTENER = (
     Path(__file__).parent / "programs" / f"{name}.py" for name in ("talker", "listener")

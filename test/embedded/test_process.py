@@ -88,6 +88,7 @@ def test_a_second_signal_while_ending_changes_nothing(program, numbers, pause):
     assert "Traceback" not in err
 
 
+@pytest.mark.processes
 def test_a_killed_process_is_forgotten_and_can_come_back(node, spin, program):
     limit = 8 if EMBEDDED else 30  # s; real ROS 2 forgets after ten and more
     got = []
@@ -101,6 +102,7 @@ def test_a_killed_process_is_forgotten_and_can_come_back(node, spin, program):
         assert node.count_publishers("chatter") == 0
 
 
+@pytest.mark.processes
 def test_a_process_that_stood_still_comes_back(node, spin, program):
     got = []
     node.create_subscription(String, "chatter", got.append, 10)
@@ -127,6 +129,7 @@ def test_a_bad_discovery_range_is_named(program):
     assert "ROS_AUTOMATIC_DISCOVERY_RANGE is 'NEAR'; it must be one of OFF, LOCALHOST" in err
 
 
+@pytest.mark.processes
 def test_settings_the_middleware_refuses_end_init(program):
     code, _, err = program("talker.py", CYCLONEDDS_URI="file:///no/such/file.xml").finish()
     assert code != 0
