@@ -79,7 +79,7 @@ class Executor:
         task = Task(callback, args, kwargs, executor=self)
         with self._tasks_lock:
             self._tasks.append((task, None, None))
-        self.wake()
+        self._interrupt()
         return task
 
     def shutdown(self, timeout_sec: float | None = None) -> bool:
@@ -116,13 +116,17 @@ class Executor:
     def wake(self) -> None:
         """Have the executor look for work again, and for entities that were added or removed."""
         self._changes += 1
-        self._progress()
+        self._interrupt()
 
-    def _progress(self) -> None:
-        """An entity or callback group became free: threads of a pool tell the one that waits."""
+    def _interrupt(self) -> None:
+        """Have the executor look for work again among what it knows."""
         waiter = self._waiter
         if waiter is not None:
             waiter.wake()
+
+    def _progress(self) -> None:
+        """An entity or callback group became free: threads of a pool tell the one that waits."""
+        self._interrupt()
 
     def get_nodes(self) -> list[Node]:
         """The nodes in this executor."""
@@ -136,7 +140,7 @@ class Executor:
 
     def spin_until_future_complete(self, future: Future, timeout_sec: float | None = None) -> None:
         """Run callbacks until ``future`` is done, the timeout passes or the context ends."""
-        future.add_done_callback(lambda _: self.wake())
+        future.add_done_callback(lambda _: self._interrupt())
         end = None if timeout_sec is None or timeout_sec < 0 else time.monotonic() + timeout_sec
         left = None if end is None else TimeoutObject(timeout_sec or 0.0)
         while self._context.ok() and not future.done() and not self._is_shutdown:
@@ -278,7 +282,7 @@ class Executor:
                 found = True
                 yield item
             entities = self._gather(used)
-            entities.fill_wait_set(self.can_execute, self._progress)
+            entities.fill_wait_set(self.can_execute, self._interrupt)
             wait = self._next_timer(entities)
             if any(e.has_work() and self.can_execute(e) for e in entities.waiting()) or any(
                 member.has_work() for member in entities.wait_set.queued()
