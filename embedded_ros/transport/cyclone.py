@@ -60,7 +60,7 @@ from .cyclone_library import (
     dds_waitset_wait,
     dds_write,
 )
-from .cyclone_types import carrier, from_cyclone, to_cyclone
+from .cyclone_types import TypesOfDomain, from_cyclone, to_cyclone
 
 SLICE = 100_000_000
 #: the binding gives the same handle as a signed number here and as an unsigned one there
@@ -69,11 +69,11 @@ _MANY = 64
 _ANY = SampleState.Any | ViewState.Any | InstanceState.Any
 
 _lock = threading.RLock()
-_domains: dict[int, tuple[str, Domain]] = {}
+_domains: dict[int, tuple[str, Domain, TypesOfDomain]] = {}
 _participants: dict[int, int] = {}
 
 
-def _enter_domain(domain_id: int) -> None:
+def _enter_domain(domain_id: int) -> TypesOfDomain:
     """Create the domain with our configuration, or join it.
 
     The Domain object outlives its participants: creating one anew costs a while and is only needed
@@ -85,7 +85,8 @@ def _enter_domain(domain_id: int) -> None:
         del _domains[domain_id], known
         known = None
     if known is None:
-        _domains[domain_id] = (config, Domain(domain_id, config))
+        known = _domains[domain_id] = (config, Domain(domain_id, config), TypesOfDomain())
+    return known[2]
 
 
 class _Peers:
@@ -316,7 +317,7 @@ class CycloneParticipant(Participant):
         with _lock:
             qos = CycloneQos(Policy.Userdata(b"enclave=/;"))
             try:
-                _enter_domain(domain_id)
+                self._types = _enter_domain(domain_id)
                 self.participant: Any = DomainParticipant(domain_id, qos=qos)
             except DDSException as error:
                 raise RuntimeError(
@@ -333,7 +334,7 @@ class CycloneParticipant(Participant):
     def _topic(self, name: str, type_name: str, type_hash: str) -> Topic:
         key = (name, type_name, type_hash)
         if key not in self._topics:
-            self._topics[key] = Topic(self.participant, name, carrier(type_name, type_hash))
+            self._topics[key] = self._types.create_topic(self.participant, *key)
         return self._topics[key]
 
     def create_writer(

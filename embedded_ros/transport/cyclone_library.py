@@ -26,6 +26,12 @@ def _function(name: str, *arguments: Any) -> Any:
 
 
 _entity = ctypes.c_int32
+_type_pointer = ctypes.POINTER(ctypes.c_void_p)
+dds_create_topic_sertype = _function(
+    "dds_create_topic_sertype", _entity, ctypes.c_char_p, _type_pointer, *[ctypes.c_void_p] * 3
+)
+dds_get_entity_sertype = _function("dds_get_entity_sertype", _entity, _type_pointer)
+ddsi_sertype_ref = _function("ddsi_sertype_ref", ctypes.c_void_p)
 dds_write = _function("dds_write", _entity, ctypes.POINTER(Payload))
 dds_assert_liveliness = _function("dds_assert_liveliness", _entity)
 dds_waitset_attach = _function("dds_waitset_attach", _entity, _entity, ctypes.c_ssize_t)

@@ -1,15 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
-"""QoS and data types between this package and Cyclone DDS."""
+"""QoS, data types and topics between this package and Cyclone DDS."""
 
 from __future__ import annotations
 
+import ctypes
 from typing import Any
 
+from cyclonedds.core import Entity
+from cyclonedds.domain import DomainParticipant
 from cyclonedds.idl import make_idl_struct, types
 from cyclonedds.qos import Policy
 from cyclonedds.qos import Qos as CycloneQos
+from cyclonedds.topic import Topic
 
 from .base import INFINITE, Qos
+from .cyclone_library import dds_create_topic_sertype, dds_get_entity_sertype, ddsi_sertype_ref
 
 #: how long a write may wait for a stalled reader of a keep-all writer, ns
 MAX_BLOCKING = 500_000_000
@@ -88,3 +93,47 @@ def carrier(type_name: str, type_hash: str) -> Any:
         cls.deserialize_key = classmethod(lambda cls_, data, *args, **kwargs: cls_(data))
         _carriers[key] = cls
     return _carriers[key]
+
+
+class TypesOfDomain:
+    """The data types that a domain knows; each stays for as long as the domain.
+
+    The binding would free a type with its last topic, though the library goes on reading it with
+    the samples of other topics; and with each further topic of a type it would set that type up
+    anew, while other threads use it. Both have crashed programs.
+    """
+
+    def __init__(self) -> None:
+        self._known: dict[tuple[str, str], int] = {}
+
+    def create_topic(
+        self, participant: DomainParticipant, name: str, type_name: str, type_hash: str
+    ) -> Topic[Any]:
+        """Make a topic. The caller sees to it that no other thread does."""
+        key = (type_name, type_hash)
+        if key in self._known:
+            return _FurtherTopic(participant, name, carrier(*key), self._known[key])
+        topic: Topic[Any] = Topic(participant, name, carrier(*key))
+        known = ctypes.c_void_p()
+        dds_get_entity_sertype(topic._ref, known)
+        ddsi_sertype_ref(known)
+        assert known.value is not None
+        self._known[key] = known.value
+        return topic
+
+
+class _FurtherTopic(Topic[Any]):
+    """A topic of a type that the domain knows."""
+
+    def __init__(
+        self, participant: DomainParticipant, name: str, data_type: Any, known: int
+    ) -> None:
+        self.data_type = data_type
+        self._keepalive_entities = [participant]
+        ddsi_sertype_ref(known)  # for the topic, which takes over this reference
+        Entity.__init__(
+            self,
+            dds_create_topic_sertype(
+                participant._ref, name.encode(), ctypes.c_void_p(known), None, None, None
+            ),
+        )
