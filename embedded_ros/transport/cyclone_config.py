@@ -32,6 +32,10 @@ _INTERNAL = "<Internal><WriterLingerDuration>30ms</WriterLingerDuration></Intern
 # ten seconds). Cyclone's own threads report in, so a busy interpreter does not look dead.
 _LEASE = "<LeaseDuration>4s</LeaseDuration><SPDPInterval>1s</SPDPInterval>"
 
+# By default Cyclone 11 gives up an address where nobody answered for 30 s. ROS 2 nodes (0.10) that
+# start there later would never be found, nor find this process.
+_PATIENT = "<InitialLocatorPruneDelay>inf</InitialLocatorPruneDelay>"
+
 _UNICAST = "<General><AllowMulticast>false</AllowMulticast></General>"
 
 
@@ -100,5 +104,6 @@ def _discovery(peers: list[str]) -> str:
 def _fragment(general: str, discovery: str) -> str:
     return (
         '<CycloneDDS><Domain Id="any">'
-        f"{general}<Discovery>{discovery}{_LEASE}</Discovery>{_INTERNAL}</Domain></CycloneDDS>"
+        f"{general}<Discovery>{discovery}{_LEASE}{_PATIENT}</Discovery>{_INTERNAL}"
+        "</Domain></CycloneDDS>"
     )

@@ -174,6 +174,8 @@ def test_domain_configuration():
     assert "<WriterLingerDuration>30ms</WriterLingerDuration>" in local
     users = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "CYCLONEDDS_URI": "file:///mine.xml"}
     assert domain_xml(users).endswith(",file:///mine.xml")
+    for kind in (local, domain_xml({})):  # who starts later is found, however late
+        assert "<InitialLocatorPruneDelay>inf</InitialLocatorPruneDelay>" in kind
     old = domain_xml({"ROS_LOCALHOST_ONLY": "1", "ROS_STATIC_PEERS": "10.0.0.1"})
     assert "10.0.0.1" not in old
     peers = domain_xml({"ROS_STATIC_PEERS": "10.0.0.1;robot.local"})
