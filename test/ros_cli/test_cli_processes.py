@@ -36,7 +36,9 @@ def test_signals_end_endless_commands_quietly(start_ccr, talking, words, line, n
     assert process.stdout.readline().startswith(line)  # reaches a pipe while the command runs
     process.send_signal(number)
     _, err = process.communicate(timeout=30)
-    assert (process.returncode, err) == (code, "")
+    # On a busy machine a command can look before the talker is found.
+    errors = [line for line in err.splitlines() if "not appear to be published yet" not in line]
+    assert (process.returncode, errors) == (code, [])
 
 
 def test_a_signal_ends_a_call_that_gets_no_answer(start_ccr, peer):
