@@ -55,6 +55,7 @@ from .cyclone_config import domain_xml, settings_in_use
 from .cyclone_library import (
     Payload,
     dds_assert_liveliness,
+    dds_wait_for_acks,
     dds_waitset_attach,
     dds_waitset_detach,
     dds_waitset_wait,
@@ -121,9 +122,12 @@ class CycloneWriter(Writer):
         )
 
     def write(self, payload: bytes) -> None:
+        writer = self._writer  # held until the end: others may close it meanwhile
+        if writer is None:
+            return
         if rest := len(payload) % 4:
             payload += bytes(4 - rest)
-        result = dds_write(self._writer._ref, Payload(payload, len(payload)))
+        result = dds_write(writer._ref, Payload(payload, len(payload)))
         if result == DDSException.DDS_RETCODE_TIMEOUT:
             raise TimeoutError("a reader takes nothing")
         if result < 0:
@@ -139,41 +143,35 @@ class CycloneWriter(Writer):
 
     def wait_for_acked(self, timeout: int) -> bool:
         until = time.monotonic_ns() + timeout
-        while True:
+        while (writer := self._writer) is not None:
             left = min(max(until - time.monotonic_ns(), 0), SLICE)
-            try:
-                if self._writer.wait_for_acks(left):
-                    return True
-            except DDSException as error:
-                if error.code != DDSException.DDS_RETCODE_TIMEOUT:
-                    raise
-            except AttributeError:
-                # The binding means to compare with the timeout code and fails over a wrong name.
-                pass
-            if left < SLICE:
-                return False
+            result = dds_wait_for_acks(writer._ref, left)
+            if result not in (0, DDSException.DDS_RETCODE_TIMEOUT):
+                raise DDSException(result, "while waiting for acknowledgements")
+            if result == 0 or left < SLICE:
+                return result == 0
+        return False
 
     def assert_liveliness(self) -> None:
-        result = dds_assert_liveliness(self._writer._ref)
-        if result < 0:
+        writer = self._writer
+        if writer is not None and (result := dds_assert_liveliness(writer._ref)) < 0:
             raise DDSException(result, "while asserting liveliness")
 
     def status(self, kind: str) -> StatusChange:
-        if self._writer is None:
+        writer = self._writer
+        if writer is None:
             return StatusChange(0, 0)
         if kind == "matched":
-            status = self._writer.get_publication_matched_status()
-            return StatusChange(status.total_count, status.total_count_change, status.current_count)
+            told = writer.get_publication_matched_status()
+            return StatusChange(told.total_count, told.total_count_change, told.current_count)
         if kind == "incompatible_qos":
-            status = self._writer.get_offered_incompatible_qos_status()
-            return StatusChange(
-                status.total_count, status.total_count_change, status.last_policy_id
-            )
+            told = writer.get_offered_incompatible_qos_status()
+            return StatusChange(told.total_count, told.total_count_change, told.last_policy_id)
         if kind == "deadline":
-            status = self._writer.get_offered_deadline_missed_status()
+            told = writer.get_offered_deadline_missed_status()
         else:
-            status = self._writer.get_liveliness_lost_status()
-        return StatusChange(status.total_count, status.total_count_change)
+            told = writer.get_liveliness_lost_status()
+        return StatusChange(told.total_count, told.total_count_change)
 
     def close(self) -> None:
         with uninterrupted(), _lock:
@@ -219,25 +217,24 @@ class CycloneReader(Reader):
             return self._peers.read() if self._reader else {}
 
     def status(self, kind: str) -> StatusChange:
-        if self._reader is None:
+        reader = self._reader
+        if reader is None:
             return StatusChange(0, 0)
         if kind == "matched":
-            status = self._reader.get_subscription_matched_status()
-            return StatusChange(status.total_count, status.total_count_change, status.current_count)
+            told = reader.get_subscription_matched_status()
+            return StatusChange(told.total_count, told.total_count_change, told.current_count)
         if kind == "incompatible_qos":
-            status = self._reader.get_requested_incompatible_qos_status()
-            return StatusChange(
-                status.total_count, status.total_count_change, status.last_policy_id
-            )
+            told = reader.get_requested_incompatible_qos_status()
+            return StatusChange(told.total_count, told.total_count_change, told.last_policy_id)
         if kind == "liveliness":
-            status = self._reader.get_liveliness_changed_status()
-            change = abs(status.alive_count_change) + abs(status.not_alive_count_change)
-            return StatusChange(status.alive_count, change, status.not_alive_count)
+            told = reader.get_liveliness_changed_status()
+            change = abs(told.alive_count_change) + abs(told.not_alive_count_change)
+            return StatusChange(told.alive_count, change, told.not_alive_count)
         if kind == "deadline":
-            status = self._reader.get_requested_deadline_missed_status()
+            told = reader.get_requested_deadline_missed_status()
         else:
-            status = self._reader.get_sample_lost_status()
-        return StatusChange(status.total_count, status.total_count_change)
+            told = reader.get_sample_lost_status()
+        return StatusChange(told.total_count, told.total_count_change)
 
     def close(self) -> None:
         with uninterrupted(), _lock:

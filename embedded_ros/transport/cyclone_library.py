@@ -33,6 +33,7 @@ dds_create_topic_sertype = _function(
 dds_get_entity_sertype = _function("dds_get_entity_sertype", _entity, _type_pointer)
 ddsi_sertype_ref = _function("ddsi_sertype_ref", ctypes.c_void_p)
 dds_write = _function("dds_write", _entity, ctypes.POINTER(Payload))
+dds_wait_for_acks = _function("dds_wait_for_acks", _entity, ctypes.c_int64)
 dds_assert_liveliness = _function("dds_assert_liveliness", _entity)
 dds_waitset_attach = _function("dds_waitset_attach", _entity, _entity, ctypes.c_ssize_t)
 dds_waitset_detach = _function("dds_waitset_detach", _entity, _entity)
