@@ -424,6 +424,32 @@ def test_threads_write_while_others_come_and_go(join):
     assert until(lambda: all(writer.matched() == 1 for writer in writers))
 
 
+def test_a_writer_may_be_closed_while_others_use_it(join):
+    participant = join()
+    failed = []
+
+    def use(writer, closed):
+        try:
+            while not closed.is_set():
+                writer.write(payload(1))
+                writer.status("matched")
+                writer.assert_liveliness()
+                writer.wait_for_acked(0)
+        except Exception as error:
+            failed.append(error)
+
+    for _ in range(50):
+        writer, closed = participant.create_writer(TOPIC, TYPE, HASH, Qos()), threading.Event()
+        users = [threading.Thread(target=use, args=(writer, closed)) for _ in range(3)]
+        for user in users:
+            user.start()
+        writer.close()
+        closed.set()
+        for user in users:
+            user.join()
+    assert not failed
+
+
 @pytest.mark.parametrize("participant_class", [LocalParticipant])
 class TestLocal:
     """What only the transport within one process promises."""
