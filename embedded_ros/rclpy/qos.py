@@ -99,6 +99,25 @@ class LivelinessPolicy(QoSPolicyEnum):
     BEST_AVAILABLE = 5
 
 
+class _OldName:
+    """A policy value under the name it had before; it warns."""
+
+    def __init__(self, old: str, new: str) -> None:
+        self._old, self._new = old, new
+
+    def __get__(self, value: object, policy: type[QoSPolicyEnum]) -> QoSPolicyEnum:
+        name = policy.__name__
+        warnings.warn(
+            f"{name}.{self._old} is deprecated. Use {name}.{self._new} instead.", stacklevel=2
+        )
+        return policy[self._new]
+
+
+for _kind in (HistoryPolicy, ReliabilityPolicy, DurabilityPolicy, LivelinessPolicy):
+    for _new in set(_kind.__members__) - {"BEST_AVAILABLE"}:
+        _old = f"RMW_QOS_POLICY_{_kind.__name__.removesuffix('Policy').upper()}_{_new}"
+        setattr(_kind, _old, _OldName(_old, _new))
+
 QoSHistoryPolicy = HistoryPolicy
 QoSReliabilityPolicy = ReliabilityPolicy
 QoSDurabilityPolicy = DurabilityPolicy

@@ -131,3 +131,17 @@ def test_default_callbacks_can_be_left_out(node):
         callbacks = PublisherEventCallbacks(use_default_callbacks=use)
         publisher = node.create_publisher(String, "text", 1, event_callbacks=callbacks)
         assert len(publisher.event_handlers) == expected
+
+
+@pytest.mark.parametrize(
+    ("policy", "old", "new"),
+    [
+        (HistoryPolicy, "RMW_QOS_POLICY_HISTORY_KEEP_LAST", "KEEP_LAST"),
+        (ReliabilityPolicy, "RMW_QOS_POLICY_RELIABILITY_BEST_EFFORT", "BEST_EFFORT"),
+        (DurabilityPolicy, "RMW_QOS_POLICY_DURABILITY_TRANSIENT_LOCAL", "TRANSIENT_LOCAL"),
+        (LivelinessPolicy, "RMW_QOS_POLICY_LIVELINESS_AUTOMATIC", "AUTOMATIC"),
+    ],
+)
+def test_old_names_of_policy_values_warn(policy, old, new):
+    with pytest.warns(UserWarning, match=f"{old} is deprecated"):
+        assert getattr(policy, old) is policy[new]
