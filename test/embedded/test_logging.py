@@ -81,3 +81,20 @@ def test_logs_are_published(node, make_node, spin):
     assert log.level == 30
     assert log.function == "test_logs_are_published"
     assert log.stamp.sec > 0
+
+
+def test_only_text_is_logged():
+    logger = get_logger("a_test.text")
+    with pytest.raises(TypeError):
+        logger.info(5)
+    assert not logger.debug(5)  # below the level, nothing is looked at
+
+
+def test_a_line_is_bound_to_its_arguments_by_messages_above_the_level():
+    logger = get_logger("a_test.bound")
+    for severity in (LoggingSeverity.DEBUG, LoggingSeverity.INFO):
+        passed = logger.log("message", severity)
+    assert passed
+    for severity in (LoggingSeverity.ERROR, LoggingSeverity.DEBUG):
+        passed = logger.log("message", severity)
+    assert not passed

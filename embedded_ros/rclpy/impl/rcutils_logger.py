@@ -148,34 +148,37 @@ class RcutilsLogger:
         ``throttle_time_source_type`` (a clock, default steady time). They are bound to the calling
         line.
 
-        :raises TypeError: an unknown or incomplete set of arguments.
+        :raises TypeError: an unknown or incomplete set of arguments, or the message is no str.
         :raises ValueError: the calling line was used with another severity or other filters before.
         """
         severity = LoggingSeverity(severity)
-        message = str(message)
+        if severity < self.get_effective_level():
+            return False
         name = kwargs.pop("name", self.name)
+        wanted = filters_from_kwargs(kwargs)
         caller = find_caller()
         context = self._contexts.get(caller)
         if context is None:
-            wanted = filters_from_kwargs(kwargs)
-            context = {"severity": severity, "name": name, "filters": wanted, "kwargs": kwargs}
+            context = {"severity": severity, "name": name, "filters": wanted}
             for wanted_filter in wanted:
                 FILTERS[wanted_filter].initialize_context(context, **kwargs)
             self._contexts[caller] = context
-        else:
-            if context["severity"] != severity:
-                raise ValueError("Logger severity cannot be changed between calls.")
-            if context["name"] != name:
-                raise ValueError("Logger name cannot be changed between calls.")
-            if context["kwargs"] != kwargs:
-                wanted = filters_from_kwargs(kwargs)
-                if wanted != context["filters"]:
-                    raise ValueError("Requested logging filters cannot be changed between calls.")
-                raise ValueError("Logging filter parameters cannot be changed between calls.")
-        if severity < effective_level(name):
+        elif context["severity"] != severity:
+            raise ValueError("Logger severity cannot be changed between calls.")
+        elif context["name"] != name:
+            raise ValueError("Logger name cannot be changed between calls.")
+        elif context["filters"] != wanted:
+            raise ValueError("Requested logging filters cannot be changed between calls.")
+        elif any(
+            context[param] != kwargs.get(param, default)
+            for wanted_filter in wanted
+            for param, default in FILTERS[wanted_filter].params.items()
+        ):
+            raise ValueError("Logging filter parameters cannot be changed between calls.")
+        if not all(FILTERS[name].should_log(context) for name in wanted):
             return False
-        if not all(FILTERS[name].should_log(context) for name in context["filters"]):
-            return False
+        if not isinstance(message, str):
+            raise TypeError(f"a message to log must be a str, got {message!r}")
         stamp = time.time_ns()
         if _stdout_logs:
             _print(name, severity, message, caller, stamp)
