@@ -101,6 +101,18 @@ def test_names_expand_without_rules(with_args):
         ("[1, 2]", [1, 2]),
         ("[1.5, 2.0]", [1.5, 2.0]),
         ("[a, b]", ["a", "b"]),
+        # as C reads numbers, with the words of YAML 1.1 for truth, and no nulls
+        ("010", 8),
+        ("0x10", 16),
+        ("09", 9.0),
+        ("1_000", "1_000"),
+        ("99999999999999999999", 1e20),
+        ("-.inf", float("-inf")),
+        ("inf", float("inf")),
+        ("Y", True),
+        ("off", False),
+        ("null", "null"),
+        ("2020-01-01", "2020-01-01"),
     ],
 )
 def test_parameter_values(with_args, text, value):
@@ -172,6 +184,9 @@ def test_other_arguments_stay():
         ("-r", "__ns:=no spaces"),
         ("-p", "novalue"),
         ("-p", "p:=[1, a]"),
+        ("-p", "p:="),
+        ("-p", "two words:=1"),
+        ("-r", "x:=/words/"),
         ("--params-file", "/does/not/exist.yaml"),
         ("--log-level", "loud"),
     ],
@@ -181,3 +196,31 @@ def test_bad_arguments_are_named(args):
     with pytest.raises(RuntimeError, match=args[1].split(":=")[0].replace("[", ".")):
         rclpy.init(args=["program", "--ros-args", *args], context=context)
     context.try_shutdown()
+
+
+def test_names_in_parameter_files_are_text(with_args, tmp_path):
+    file = tmp_path / "parameters.yaml"
+    file.write_text("solver: {ros__parameters: {on: 1, y: 2, 7: 3}}")
+    node = with_args("--ros-args", "--params-file", str(file))
+    for name, value in (("on", 1), ("y", 2), ("7", 3)):
+        assert node.declare_parameter(name, 0).value == value
+
+
+def test_an_empty_parameter_file_says_nothing(with_args, tmp_path):
+    file = tmp_path / "parameters.yaml"
+    file.write_text("# nothing yet")
+    node = with_args("--ros-args", "--params-file", str(file))
+    assert node.declare_parameter("a", 1).value == 1
+
+
+def test_rules_outside_of_ros_args_count_and_warn(with_args, capfd):
+    node = with_args("chatter:=words", "--speed:=5", "__node:=other")
+    assert node.get_fully_qualified_name() == "/other"
+    assert node.resolve_topic_name("chatter") == "/words"
+    assert "is deprecated" in capfd.readouterr().err
+    assert remove_ros_args(["program", "a:=b", "--speed:=5"]) == ["program", "--speed:=5"]
+
+
+def test_a_rule_without_its_flag_is_unknown():
+    with pytest.raises(RuntimeError, match="a:=b"):
+        rclpy.init(args=["program", "--ros-args", "a:=b"], context=rclpy.Context())

@@ -10,9 +10,11 @@ from typing import Any
 
 from .._rclpy_pybind11 import RCLInvalidROSArgsError, UnknownROSArgsError
 from ..expand_topic_name import expand_topic_name
+from ..logging import get_logger
 from ..validate_node_name import is_valid_node_name
 from .parameter_files import ParameterBlock, parse_value, read_parameter_file
 
+_TOKEN = "[A-Za-z_{][A-Za-z0-9_{}]*"
 _NODE_RULES = ("__node", "__name")
 _FLAGS = {
     f"--{onoff}-{what}-logs": (what, onoff == "enable")
@@ -72,7 +74,7 @@ def parse_remap(text: str) -> RemapRule:
         kind = "namespace"
     else:
         for name in (left, replacement):
-            if not re.fullmatch(r"(/|~/?)?([A-Za-z_{][A-Za-z0-9_{}]*/?)*", name) or "//" in name:
+            if not re.fullmatch(f"~|(~?/)?{_TOKEN}(/{_TOKEN})*", name):
                 raise _invalid(text, f"{name!r} is no topic or service name")
     return RemapRule(kind, node, left, replacement)
 
@@ -86,6 +88,8 @@ def _parse_parameter(text: str) -> ParameterBlock:
         node, name = "/**", left
     elif not node.startswith("/"):
         node = "/**/" + node
+    if re.search(r"\s", name):
+        raise _invalid(text, f"{name!r} is no parameter name")
     try:
         return ParameterBlock(node, {name: parse_value(value)})
     except ValueError as error:
@@ -110,7 +114,7 @@ def parse_arguments(args: Sequence[str]) -> tuple[RosArguments, list[str]]:
         if not inside:
             if argument == "--ros-args":
                 inside = True
-            else:
+            elif not _apply_bare_rule(result, argument):
                 others.append(argument)
             continue
         if argument == "--":
@@ -125,8 +129,6 @@ def parse_arguments(args: Sequence[str]) -> tuple[RosArguments, list[str]]:
                 raise _invalid(argument, "its value is missing")
             _apply(result, argument, args[index])
             index += 1
-        elif ":=" in argument and not argument.startswith("-"):
-            result.rules.append(parse_remap(argument))
         else:
             raise UnknownROSArgsError(f"Found unknown ROS arguments: [{argument!r}]")
     return result, others
@@ -146,6 +148,19 @@ _WITH_VALUE = frozenset(
         "--log-file-name",
     ]
 )
+
+
+def _apply_bare_rule(result: RosArguments, argument: str) -> bool:
+    """Take a remapping rule that stands outside of --ros-args, as ROS 2 used to have it."""
+    try:
+        result.rules.append(parse_remap(argument))
+    except RCLInvalidROSArgsError:
+        return False
+    get_logger("rcl").warning(
+        f"Found remap rule {argument!r}. This syntax is deprecated. "
+        f"Use '--ros-args --remap {argument}' instead."
+    )
+    return True
 
 
 def _apply(result: RosArguments, argument: str, value: str) -> None:

@@ -10,37 +10,39 @@ from typing import Any
 
 import yaml  # type: ignore[import-untyped]
 
+_TRUE = frozenset(["Y", "y", "yes", "Yes", "YES", "true", "True", "TRUE", "on", "On", "ON"])
+_FALSE = frozenset(["N", "n", "no", "No", "NO", "false", "False", "FALSE", "off", "Off", "OFF"])
+_INTEGER = re.compile(r"[-+]?(0x[0-9a-f]+|0[0-7]*|[1-9][0-9]*)", re.IGNORECASE)
+_FLOAT = re.compile(
+    r"[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?|[-+]?(inf|infinity|nan)|[-+]?\.inf|\.nan",
+    re.IGNORECASE | re.ASCII,
+)
+
 
 class _Loader(yaml.SafeLoader):
-    """YAML 1.1 with the numbers that rcl's parser accepts, such as ``1e-3``, and no dates."""
+    """YAML whose plain scalars are read as rcl reads them: as C does, with no nulls and dates."""
 
 
-_Loader.yaml_implicit_resolvers = {
-    first: [
-        (tag, pattern)
-        for tag, pattern in resolvers
-        if not tag.endswith((":timestamp", ":float", ":int"))
-    ]
-    for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
-}
-_Loader.add_implicit_resolver(
-    "tag:yaml.org,2002:float",
-    re.compile(
-        r"^[-+]?(\d+\.\d*([eE][-+]?\d+)?|\.\d+([eE][-+]?\d+)?|\d+[eE][-+]?\d+|\.(inf|Inf|INF|nan|NaN|NAN))$"
-    ),
-    list("-+0123456789."),
-)
-_Loader.add_implicit_resolver(
-    "tag:yaml.org,2002:int", re.compile(r"^[-+]?(0x[0-9a-fA-F]+|\d+)$"), list("-+0123456789")
-)
+_Loader.yaml_implicit_resolvers = {None: [("!plain", re.compile(""))]}
 
 
-def _construct_int(loader: _Loader, node: Any) -> int:
-    text = loader.construct_scalar(node)
-    return int(text, 16 if "x" in text else 10)
+def _construct_plain(loader: _Loader, node: Any) -> bool | int | float | str:
+    text: str = node.value
+    if not text:
+        raise ValueError(f"line {node.start_mark.line + 1}: a parameter must have a value")
+    if text in _TRUE or text in _FALSE:
+        return text in _TRUE
+    if _INTEGER.fullmatch(text):
+        octal = re.match("[-+]?0[0-7]", text)
+        value = int(text, 8 if octal else 0)
+        if -(2**63) <= value < 2**63:
+            return value
+    if _FLOAT.fullmatch(text):
+        return float(re.sub(r"\.(?=[a-z])", "", text, flags=re.IGNORECASE))
+    return text
 
 
-_Loader.add_constructor("tag:yaml.org,2002:int", _construct_int)
+_Loader.add_constructor("!plain", _construct_plain)
 
 
 @dataclass(frozen=True)
@@ -63,14 +65,16 @@ class ParameterBlock:
         return re.fullmatch(expression, full_node_name) is not None
 
 
-def check_value(value: Any, where: str) -> Any:
-    """Check that a YAML value is one that parameters can hold.
+def _value(loader: _Loader, node: Any, where: str) -> Any:
+    """The value of a YAML node, if it is one that parameters can hold.
 
     :raises ValueError: it is not; the message says where.
     """
+    try:
+        value = loader.construct_object(node, deep=True)
+    except ValueError as error:
+        raise ValueError(f"{where}: {error}") from error
     if isinstance(value, (bool, int, float, str)):
-        if isinstance(value, int) and not isinstance(value, bool) and not -(2**63) <= value < 2**63:
-            raise ValueError(f"{where}: {value} does not fit 64 bits")
         return value
     if isinstance(value, list):
         kinds = {type(item) for item in value}
@@ -85,27 +89,27 @@ def parse_value(text: str) -> Any:
 
     :raises ValueError: it cannot be read.
     """
+    loader = _Loader(text)
     try:
-        value = yaml.load(text, _Loader) if text else ""
+        node = loader.get_single_node()
+        if node is None:
+            raise ValueError("a parameter must have a value")
+        return _value(loader, node, "value")
     except yaml.YAMLError as error:
         raise ValueError(f"no YAML value: {error}") from error
-    if value is None and text:
-        raise ValueError("a parameter must have a value")
-    return check_value(value, "value")
+    finally:
+        loader.dispose()
 
 
-def flatten(tree: dict[Any, Any], where: str, prefix: str = "") -> dict[str, Any]:
-    """Nested parameters as one dictionary with dotted names.
-
-    :raises ValueError: a value cannot be a parameter's.
-    """
+def _flatten(loader: _Loader, tree: Any, where: str, prefix: str = "") -> dict[str, Any]:
+    """Nested parameters as one dictionary with dotted names."""
     values: dict[str, Any] = {}
-    for key, value in tree.items():
-        name = f"{prefix}{key}"
-        if isinstance(value, dict):
-            values.update(flatten(value, where, name + "."))
+    for key, value in tree.value:
+        name = prefix + key.value
+        if isinstance(value, yaml.MappingNode):
+            values.update(_flatten(loader, value, where, name + "."))
         else:
-            values[name] = check_value(value, f"{where}: {name}")
+            values[name] = _value(loader, value, f"{where}: {name}")
     return values
 
 
@@ -131,16 +135,14 @@ def read_parameter_file(path: str) -> list[ParameterBlock]:
                 continue
             if not name:
                 raise ValueError(f"{where}: ros__parameters stands outside of any node name")
-            tree = loader.construct_object(value, deep=True)
-            if not isinstance(tree, dict):
+            if not isinstance(value, yaml.MappingNode):
                 raise ValueError(f"{where}: ros__parameters must be a mapping")
-            blocks.append(ParameterBlock(name, flatten(tree, where)))
+            blocks.append(ParameterBlock(name, _flatten(loader, value, where)))
 
     try:
         root = loader.get_single_node()
-        if root is None:
-            raise ValueError(f"{path}: the file is empty")
-        walk(root, "")
+        if root is not None:
+            walk(root, "")
     except yaml.YAMLError as error:
         raise ValueError(f"{path}: {error}") from error
     finally:
