@@ -10,7 +10,6 @@ from rcl_interfaces.msg import (
     ListParametersResult,
     ParameterDescriptor,
     ParameterEvent,
-    ParameterType,
     SetParametersResult,
 )
 
@@ -331,8 +330,6 @@ class ParameterHolder:
 
             message = ParameterMsg(name=name, value=alternative_value)
             candidates.append(Parameter.from_parameter_msg(message))
-        if descriptor.type == ParameterType.PARAMETER_NOT_SET and not descriptor.dynamic_typing:
-            descriptor.type = self._descriptors[name].type
         for candidate in candidates:
             result = apply_descriptor(candidate, descriptor, True, False)
             if result.successful:

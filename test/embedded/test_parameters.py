@@ -209,3 +209,12 @@ def test_describe(node):
     descriptor = node.describe_parameter("p")
     assert (descriptor.name, descriptor.description) == ("p", "a number")
     assert descriptor.type == Parameter.Type.INTEGER.value
+
+
+def test_a_new_descriptor_must_name_the_type(node):
+    node.declare_parameter("speed", 1)
+    with pytest.raises(InvalidParameterValueException):
+        node.set_descriptor("speed", ParameterDescriptor(description="m/s"))
+    wanted = ParameterDescriptor(description="m/s", type=Parameter.Type.INTEGER.value)
+    assert node.set_descriptor("speed", wanted).integer_value == 1
+    assert node.describe_parameter("speed").description == "m/s"
