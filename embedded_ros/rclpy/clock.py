@@ -211,11 +211,10 @@ class ROSClock(Clock):
         if enabled == self._active:
             return
         change = ClockChange.ROS_TIME_ACTIVATED if enabled else ClockChange.ROS_TIME_DEACTIVATED
-        before = self._now()
         handles = [h for h in self._jump_handles if h.threshold.on_clock_change]
         self._announce(handles)
         self._active = enabled
-        self._report(handles, TimeJump(change, Duration(nanoseconds=self._now() - before)))
+        self._report(handles, TimeJump(change, Duration()))
 
     def set_ros_time_override(self, time: Time) -> None:
         """Set the time that :meth:`now` gives while the override is active.

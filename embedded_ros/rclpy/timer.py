@@ -8,6 +8,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
+from ._rclpy_pybind11 import RCLError
 from .clock import Clock
 from .destroyable import Destroyable
 from .exceptions import ROSInterruptException
@@ -30,7 +31,7 @@ class Timer(Destroyable):
     ) -> None:
         """Start a timer with a period in nanoseconds.
 
-        :raises ValueError: the period is negative.
+        :raises RCLError: the period is negative.
         """
         self._context = get_default_context() if context is None else context
         self._clock = clock
@@ -48,7 +49,7 @@ class Timer(Destroyable):
     def _checked(period: int) -> int:
         period = int(period)
         if period < 0:
-            raise ValueError(f"timer period must be non-negative, got {period} ns")
+            raise RCLError(f"timer period must be non-negative, got {period} ns")
         return period
 
     @property
@@ -112,11 +113,11 @@ class Timer(Destroyable):
             now = self._clock._now()
             self._last_call = now
             self._next_call += self._period
-            if self._next_call < now:
+            if self._next_call <= now:
                 if self._period == 0:
                     self._next_call = now
                 else:
-                    missed = 1 + (now - self._next_call - 1) // self._period
+                    missed = 1 + (now - self._next_call) // self._period
                     self._next_call += missed * self._period
 
     def on_clock_jump(self) -> None:

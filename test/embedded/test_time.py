@@ -6,6 +6,7 @@ import time
 import pytest
 from builtin_interfaces.msg import Duration as DurationMsg
 from builtin_interfaces.msg import Time as TimeMsg
+from rclpy._rclpy_pybind11 import RCLError
 from rclpy.clock import Clock, ClockType, JumpThreshold, ROSClock
 from rclpy.duration import Duration, Infinite
 from rclpy.parameter import Parameter
@@ -97,3 +98,36 @@ def test_jump_callbacks():
     assert len(jumps) == 1
     with pytest.raises(ValueError):
         JumpThreshold(min_forward=Duration(seconds=-1), min_backward=None)
+
+
+def test_a_timer_fires_once_when_time_jumps_onto_its_beat(make_node, spin):
+    node = make_node(parameter_overrides=[Parameter("use_sim_time", value=True)])
+    publisher = node.create_publisher(ClockMsg, "/clock", 10)
+    fired = []
+    node.create_timer(1.0, lambda: fired.append(node.get_clock().now().nanoseconds // 10**9))
+    steps = []
+    node.create_timer(0.001, lambda: steps.append(0), clock=Clock(clock_type=ClockType.STEADY_TIME))
+    assert spin(lambda: publisher.get_subscription_count() == 1, node)
+    for second in (10, 13):
+        publisher.publish(ClockMsg(clock=TimeMsg(sec=second)))
+        assert spin(lambda second=second: fired[-1:] == [second], node)
+        steps.clear()
+        assert spin(lambda: len(steps) > 5, node)
+    assert fired == [10, 13]
+
+
+def test_changing_the_source_of_time_is_no_jump_by_a_duration():
+    clock = ROSClock()
+    jumps = []
+    threshold = JumpThreshold(min_forward=None, min_backward=None, on_clock_change=True)
+    with clock.create_jump_callback(
+        threshold, pre_callback=lambda: None, post_callback=lambda jump: jumps.append(jump.delta)
+    ):
+        clock._set_ros_time_is_active(True)
+        clock._set_ros_time_is_active(False)
+    assert jumps == [Duration(), Duration()]
+
+
+def test_negative_periods_are_refused(node):
+    with pytest.raises(RCLError):
+        node.create_timer(-1.0, None)
