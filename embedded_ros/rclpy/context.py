@@ -118,12 +118,20 @@ class Context:
         :raises RCLError: the context is shut down.
         """
         with self._lock:
-            if not self._is_ok or self._participant is None:
-                raise RCLError(
-                    "the given context is not valid, either rcl_init() was not called or it was "
-                    "shut down"
-                )
+            self.check()
+            assert self._participant is not None
             return self._participant
+
+    def check(self) -> None:
+        """Check that the context can be used.
+
+        :raises RCLError: it was not initialised, or is shut down.
+        """
+        if not self._is_ok or self._participant is None:
+            raise RCLError(
+                "the given context is not valid, either rcl_init() was not called or it was "
+                "shut down"
+            )
 
     @property
     def graph(self) -> Graph:

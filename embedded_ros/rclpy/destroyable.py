@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from ._rclpy_pybind11 import RCLError
 from .exceptions import InvalidHandle
 
 
@@ -12,6 +13,8 @@ class Destroyable:
     """Something that is given up once. It is its own ``handle``, for ``with x.handle:``."""
 
     _destroyed = False
+    #: its context was shut down: whatever needs no middleware still works
+    _orphaned = False
 
     @property
     def handle(self) -> Any:
@@ -19,7 +22,7 @@ class Destroyable:
 
         :raises InvalidHandle: it was destroyed.
         """
-        if self._destroyed:
+        if self._destroyed and not self._orphaned:
             raise InvalidHandle("cannot use Destroyable because destruction was requested")
         return self
 
@@ -36,3 +39,21 @@ class Destroyable:
     def destroy_when_not_in_use(self) -> None:
         """Give it up."""
         self.destroy()
+
+
+class _Ended:
+    """Stands in for the endpoints that a context took along."""
+
+    guid = b""
+
+    def close(self) -> None:
+        pass
+
+    def take(self, limit: int) -> list[Any]:
+        return []
+
+    def __getattr__(self, name: str) -> Any:
+        raise RCLError("the context of this entity was shut down")
+
+
+ENDED = _Ended()

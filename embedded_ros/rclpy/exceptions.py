@@ -6,7 +6,7 @@ from __future__ import annotations
 from typing import Any
 
 
-class InvalidHandle(Exception):
+class InvalidHandle(RuntimeError):
     """An entity was used after it was destroyed."""
 
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 import weakref
 from typing import Any
 
-from embedded_ros.interfaces.registry import registry
+from rcl_interfaces.msg import ParameterDescriptor, ParameterEvent, SetParametersResult
 
 from ._rclpy_pybind11 import NodeNameNonExistentError
 from .callback_groups import (
@@ -55,11 +55,13 @@ __all__ = [
     "Node",
     "NodeNameNonExistentError",
     "Parameter",
+    "ParameterDescriptor",
     "Publisher",
     "QoSProfile",
     "Rate",
     "ReentrantCallbackGroup",
     "Service",
+    "SetParametersResult",
     "Subscription",
     "Timer",
 ]
@@ -123,7 +125,7 @@ class Node(ParameterHolder, EntityHolder, GraphViewer, Destroyable):
         self._clock = ROSClock()
         self._rosout = Rosout(self) if enable_rosout and self._arguments.logs("rosout") else None
         self._parameter_event_publisher = self.create_publisher(
-            registry.message_class("rcl_interfaces/msg/ParameterEvent"),
+            ParameterEvent,
             "/parameter_events",
             qos_profile_parameter_events,
         )
@@ -132,7 +134,7 @@ class Node(ParameterHolder, EntityHolder, GraphViewer, Destroyable):
             self.declare_parameters(
                 "",
                 [
-                    (name, parameter.value, self._free_descriptor())
+                    (name, parameter.value, ParameterDescriptor())
                     for name, parameter in self._parameter_overrides.items()
                 ],
                 ignore_override=True,
@@ -144,11 +146,6 @@ class Node(ParameterHolder, EntityHolder, GraphViewer, Destroyable):
         if enable_logger_service:
             self._logger_service = LoggingService(self)
         self._type_description_service = TypeDescriptionService(self)
-
-    @staticmethod
-    def _free_descriptor() -> Any:
-        descriptor: Any = registry.message_class("rcl_interfaces/msg/ParameterDescriptor")
-        return descriptor()
 
     def _read_overrides(self, overrides: list[Parameter] | None) -> None:
         given = self._arguments.parameters(self.get_fully_qualified_name())
@@ -251,7 +248,7 @@ class Node(ParameterHolder, EntityHolder, GraphViewer, Destroyable):
             executor.remove_node(self)
         if self._rosout is not None:
             self._rosout.close()
-        self._destroy_entities()
+        self._destroy_entities(orphan=not self._destroyed)
         self._context.nodes.discard(self)
         if self._context.ok():
             self._context.graph.remove_node(self._entry)

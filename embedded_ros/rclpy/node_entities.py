@@ -14,6 +14,7 @@ from .callback_groups import CallbackGroup, MutuallyExclusiveCallbackGroup, Reen
 from .client import Client
 from .clock import Clock, ROSClock
 from .constants import S_TO_NS
+from .destroyable import ENDED
 from .event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from .guard_condition import GuardCondition
 from .impl.queued import QueuedEntity
@@ -277,6 +278,7 @@ class EntityHolder:
         autostart: bool = True,
     ) -> Timer:
         """Make a timer with a period in seconds, on the node's clock unless another is given."""
+        self._context.check()
         group = callback_group or self._default_callback_group
         timer = Timer(
             callback,
@@ -293,6 +295,7 @@ class EntityHolder:
         self, callback: Callable[..., Any], callback_group: CallbackGroup | None = None
     ) -> GuardCondition:
         """Make a guard condition."""
+        self._context.check()
         group = callback_group or self._default_callback_group
         guard = GuardCondition(callback, group, context=self._context)
         guard._wake = self._wake_executor
@@ -353,8 +356,8 @@ class EntityHolder:
         rate.destroy()
         return self.destroy_timer(rate._timer)
 
-    def _destroy_entities(self) -> None:
-        """Destroy everything that was made here."""
+    def _destroy_entities(self, orphan: bool) -> None:
+        """Destroy everything that was made here; `orphan`: because the context was shut down."""
         made: tuple[list[Any], ...]
         made = (
             self._clients,
@@ -367,5 +370,8 @@ class EntityHolder:
         everything: list[Any] = [entity for known in made for entity in known]
         for entity in everything:
             entity.destroy()
+            if orphan:
+                entity._orphaned = True
+                entity._endpoint = entity._writer = ENDED
         for known in (*made, self._waitables):
             known.clear()

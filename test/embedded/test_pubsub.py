@@ -6,6 +6,7 @@ import signal
 import pytest
 import rclpy
 from geometry_msgs.msg import Pose, PoseArray
+from rclpy._rclpy_pybind11 import RCLError
 from rclpy.duration import Duration
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.qos import (
@@ -234,3 +235,23 @@ def test_remapping_on_the_command_line_of_another_process(node, spin, program):
     assert spin(lambda: ("speaker", "/left") in node.get_node_names_and_namespaces(), node)
     talker.process.send_signal(signal.SIGINT)
     assert talker.finish()[0] == 0
+
+
+def test_what_is_left_after_a_shutdown(node, context):
+    publisher = node.create_publisher(String, "words", 1)
+    subscription = node.create_subscription(String, "words", print, 1)
+    timer = node.create_timer(1.0, None)
+    context.shutdown()
+    assert publisher.topic_name == subscription.topic_name == "/words"
+    timer.cancel()
+    assert timer.is_canceled()
+    for use in (
+        lambda: publisher.publish(String()),
+        publisher.get_subscription_count,
+        lambda: node.create_publisher(String, "more", 1),
+        lambda: node.create_timer(1.0, None),
+        lambda: node.create_guard_condition(print),
+    ):
+        with pytest.raises(RCLError):
+            use()
+    publisher.destroy()
