@@ -175,7 +175,7 @@ class Context:
         live_contexts.discard(self)
         for node in list(self.nodes):
             with contextlib.suppress(Exception):
-                node._release()
+                node._ros_release()
         if self._graph is not None:
             self._graph.close()
         if self._participant is not None:

@@ -12,9 +12,9 @@ from .exceptions import InvalidHandle
 class Destroyable:
     """Something that is given up once. It is its own ``handle``, for ``with x.handle:``."""
 
-    _destroyed = False
+    _ros_destroyed = False
     #: its context was shut down: whatever needs no middleware still works
-    _orphaned = False
+    _ros_orphaned = False
 
     @property
     def handle(self) -> Any:
@@ -22,7 +22,7 @@ class Destroyable:
 
         :raises InvalidHandle: it was destroyed.
         """
-        if self._destroyed and not self._orphaned:
+        if self._ros_destroyed and not self._ros_orphaned:
             raise InvalidHandle("cannot use Destroyable because destruction was requested")
         return self
 
@@ -34,7 +34,7 @@ class Destroyable:
 
     def destroy(self) -> None:
         """Give it up."""
-        self._destroyed = True
+        self._ros_destroyed = True
 
     def destroy_when_not_in_use(self) -> None:
         """Give it up."""

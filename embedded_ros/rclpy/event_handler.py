@@ -110,7 +110,7 @@ class EventHandle(Destroyable):
 
     def is_ready(self) -> bool:
         """Whether there is news."""
-        if not self._destroyed:
+        if not self._ros_destroyed:
             status = self._endpoint.status(self._status)
             self._now = status.total, status.detail
             if self._status == "incompatible_qos":

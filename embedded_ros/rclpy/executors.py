@@ -242,7 +242,7 @@ class Executor:
         """Nanoseconds until the next timer that may run, or None."""
         soonest = None
         for timer in entities.timers + entities.wait_set.members("timer"):
-            if timer._destroyed or (timer.callback_group and not self.can_execute(timer)):
+            if timer._ros_destroyed or (timer.callback_group and not self.can_execute(timer)):
                 continue
             left = timer.time_until_next_call()
             if left is not None and (soonest is None or left < soonest):

@@ -105,31 +105,33 @@ class Node(ParameterHolder, EntityHolder, GraphViewer, Destroyable):
         self._context = get_default_context() if context is None else context
         if not self._context.ok():
             raise NotInitializedException("cannot create node")
-        self._executor_ref: weakref.ref[Executor] | None = None
-        self._released = False
+        self._ros_executor_ref: weakref.ref[Executor] | None = None
+        self._ros_released = False
 
         sources = [self._context.arguments] if use_global_arguments else []
         if cli_args:
             sources.insert(0, parse_arguments(["--ros-args", *cli_args])[0])
-        self._arguments = NodeArguments(sources)
+        self._ros_arguments = NodeArguments(sources)
         namespace = namespace or "/"
         if not namespace.startswith("/"):
             namespace = "/" + namespace
         validate_node_name(node_name)
         validate_namespace(namespace)
-        self._name, self._namespace = self._arguments.names(node_name, namespace)
+        self._ros_name, self._ros_namespace = self._ros_arguments.names(node_name, namespace)
 
-        self._entry = self._context.graph.add_node(self._namespace, self._name)
+        self._ros_entry = self._context.graph.add_node(self._ros_namespace, self._ros_name)
         self._context.nodes.add(self)
         self._logger = get_logger(self.get_fully_qualified_name()[1:].replace("/", "."))
         self._clock = ROSClock()
-        self._rosout = Rosout(self) if enable_rosout and self._arguments.logs("rosout") else None
+        self._ros_rosout = (
+            Rosout(self) if enable_rosout and self._ros_arguments.logs("rosout") else None
+        )
         self._parameter_event_publisher = self.create_publisher(
             ParameterEvent,
             "/parameter_events",
             qos_profile_parameter_events,
         )
-        self._read_overrides(parameter_overrides)
+        self._ros_read_overrides(parameter_overrides)
         if automatically_declare_parameters_from_overrides:
             self.declare_parameters(
                 "",
@@ -147,8 +149,8 @@ class Node(ParameterHolder, EntityHolder, GraphViewer, Destroyable):
             self._logger_service = LoggingService(self)
         self._type_description_service = TypeDescriptionService(self)
 
-    def _read_overrides(self, overrides: list[Parameter] | None) -> None:
-        given = self._arguments.parameters(self.get_fully_qualified_name())
+    def _ros_read_overrides(self, overrides: list[Parameter] | None) -> None:
+        given = self._ros_arguments.parameters(self.get_fully_qualified_name())
         self._parameter_overrides = {
             name: Parameter(name, value=value) for name, value in given.items()
         }
@@ -171,15 +173,15 @@ class Node(ParameterHolder, EntityHolder, GraphViewer, Destroyable):
 
     def get_name(self) -> str:
         """The node name, after remapping."""
-        return self.handle._name
+        return self.handle._ros_name
 
     def get_namespace(self) -> str:
         """The namespace, after remapping."""
-        return self.handle._namespace
+        return self.handle._ros_namespace
 
     def get_fully_qualified_name(self) -> str:
         """Namespace and name."""
-        return f"{self._namespace.rstrip('/')}/{self._name}"
+        return f"{self._ros_namespace.rstrip('/')}/{self._ros_name}"
 
     def get_clock(self) -> Clock:
         """The node's clock: ROS time."""
@@ -192,7 +194,7 @@ class Node(ParameterHolder, EntityHolder, GraphViewer, Destroyable):
     @property
     def executor(self) -> Executor | None:
         """The executor that the node is in."""
-        return self._executor_ref() if self._executor_ref is not None else None
+        return self._ros_executor_ref() if self._ros_executor_ref is not None else None
 
     @executor.setter
     def executor(self, new_executor: Executor | None) -> None:
@@ -201,7 +203,7 @@ class Node(ParameterHolder, EntityHolder, GraphViewer, Destroyable):
             return
         if current is not None:
             current.remove_node(self)
-        self._executor_ref = None if new_executor is None else weakref.ref(new_executor)
+        self._ros_executor_ref = None if new_executor is None else weakref.ref(new_executor)
         if new_executor is not None:
             new_executor.add_node(self)
 
@@ -212,7 +214,7 @@ class Node(ParameterHolder, EntityHolder, GraphViewer, Destroyable):
 
     # --- names
 
-    def _full_name(self, name: str, service: bool = False, remap: bool = True) -> str:
+    def _ros_full_name(self, name: str, service: bool = False, remap: bool = True) -> str:
         if not isinstance(name, str):
             raise TypeError(f"a topic or service name must be a str, got {name!r}")
         validate_topic_name(name, is_service=service)
@@ -221,34 +223,34 @@ class Node(ParameterHolder, EntityHolder, GraphViewer, Destroyable):
         except ValueError as error:
             raise ValueError(str(error)) from None
         if remap:
-            full = self._arguments.remap(full, self._name, self._namespace, service)
+            full = self._ros_arguments.remap(full, self._ros_name, self._ros_namespace, service)
         validate_full_topic_name(full, is_service=service)
         return full
 
     def resolve_topic_name(self, topic: str, *, only_expand: bool = False) -> str:
         """The full name of a topic, after remapping unless ``only_expand``."""
-        return self._full_name(topic, remap=not only_expand)
+        return self._ros_full_name(topic, remap=not only_expand)
 
     def resolve_service_name(self, service: str, *, only_expand: bool = False) -> str:
         """The full name of a service, after remapping unless ``only_expand``."""
-        return self._full_name(service, service=True, remap=not only_expand)
+        return self._ros_full_name(service, service=True, remap=not only_expand)
 
     def destroy_node(self) -> None:
         """Leave the graph with everything that was made here."""
-        self._destroyed = True
-        self._release()
+        self._ros_destroyed = True
+        self._ros_release()
 
-    def _release(self) -> None:
+    def _ros_release(self) -> None:
         """Leave the graph; name and logger stay usable, as they do in rclpy after a shutdown."""
-        if self._released:
+        if self._ros_released:
             return
-        self._released = True
+        self._ros_released = True
         executor = self.executor
         if executor is not None:
             executor.remove_node(self)
-        if self._rosout is not None:
-            self._rosout.close()
-        self._destroy_entities(orphan=not self._destroyed)
+        if self._ros_rosout is not None:
+            self._ros_rosout.close()
+        self._ros_destroy_entities(orphan=not self._ros_destroyed)
         self._context.nodes.discard(self)
         if self._context.ok():
-            self._context.graph.remove_node(self._entry)
+            self._context.graph.remove_node(self._ros_entry)

@@ -36,7 +36,7 @@ class EntityHolder:
     """What a node has made."""
 
     _context: Context
-    _entry: NodeEntry
+    _ros_entry: NodeEntry
     _clock: ROSClock
     _logger: RcutilsLogger
 
@@ -54,10 +54,10 @@ class EntityHolder:
     def _wake_executor(self) -> None:
         raise NotImplementedError
 
-    def _full_name(self, name: str, service: bool = False, remap: bool = True) -> str:
+    def _ros_full_name(self, name: str, service: bool = False, remap: bool = True) -> str:
         raise NotImplementedError
 
-    def _public(self, entities: list[Any]) -> list[Any]:
+    def _ros_public(self, entities: list[Any]) -> list[Any]:
         """Without those that actions consist of: an action is one waitable."""
         parts = {part for one in self._waitables for part in getattr(one, "_parts", ())}
         return [entity for entity in entities if entity not in parts]
@@ -65,22 +65,22 @@ class EntityHolder:
     @property
     def publishers(self) -> Iterator[Publisher]:
         """The publishers created here."""
-        yield from self._public(self._publishers)
+        yield from self._ros_public(self._publishers)
 
     @property
     def subscriptions(self) -> Iterator[Subscription]:
         """The subscriptions created here."""
-        yield from self._public(self._subscriptions)
+        yield from self._ros_public(self._subscriptions)
 
     @property
     def clients(self) -> Iterator[Client]:
         """The service clients created here."""
-        yield from self._public(self._clients)
+        yield from self._ros_public(self._clients)
 
     @property
     def services(self) -> Iterator[Service]:
         """The services created here."""
-        yield from self._public(self._services)
+        yield from self._ros_public(self._services)
 
     @property
     def timers(self) -> Iterator[Timer]:
@@ -111,7 +111,7 @@ class EntityHolder:
         self._waitables.remove(waitable)
         self._wake_executor()
 
-    def _profile(
+    def _ros_profile(
         self,
         qos_or_depth: QoSProfile | int,
         kind: type[Publisher | Subscription],
@@ -123,19 +123,22 @@ class EntityHolder:
             if options is None:
                 return qos_or_depth
             profile = copy.copy(qos_or_depth)
-            full = self._full_name(topic)
+            full = self._ros_full_name(topic)
             _declare_qos_parameters(kind, cast("Node", self), full, profile, options)
             return profile
         if isinstance(qos_or_depth, int):
             if qos_or_depth < 0:
                 raise ValueError("history depth must be greater than or equal to zero")
             profile = QoSProfile(depth=qos_or_depth)
-            return self._profile(profile, kind, topic, options)
+            return self._ros_profile(profile, kind, topic, options)
         raise TypeError(f"Expected QoSProfile or int, but received {type(qos_or_depth)!r}")
 
-    def _announce(self, writer: Any = None, reader: Any = None, remove: bool = False) -> None:
+    def _ros_announce(self, writer: Any = None, reader: Any = None, remove: bool = False) -> None:
         """Tell the graph which endpoints this node has."""
-        for endpoint, known in ((writer, self._entry.writers), (reader, self._entry.readers)):
+        for endpoint, known in (
+            (writer, self._ros_entry.writers),
+            (reader, self._ros_entry.readers),
+        ):
             if endpoint is not None:
                 if not remove:
                     known.append(endpoint.guid)
@@ -161,7 +164,7 @@ class EntityHolder:
         :raises InvalidTopicNameException: the topic name is invalid.
         :raises InvalidQosOverridesError: the options' callback refuses what parameters ask for.
         """
-        profile = self._profile(qos_profile, Publisher, topic, qos_overriding_options)
+        profile = self._ros_profile(qos_profile, Publisher, topic, qos_overriding_options)
         publisher = publisher_class(
             cast("Node", self),
             msg_type,
@@ -193,7 +196,7 @@ class EntityHolder:
         :raises InvalidTopicNameException: the topic name is invalid.
         :raises InvalidQosOverridesError: the options' callback refuses what parameters ask for.
         """
-        profile = self._profile(qos_profile, Subscription, topic, qos_overriding_options)
+        profile = self._ros_profile(qos_profile, Subscription, topic, qos_overriding_options)
         subscription = Subscription(
             cast("Node", self),
             msg_type,
@@ -205,9 +208,9 @@ class EntityHolder:
             event_callbacks=event_callbacks or SubscriptionEventCallbacks(),
         )
         self._waitables.extend(subscription.event_handlers)
-        return self._keep(subscription, self._subscriptions)
+        return self._ros_keep(subscription, self._subscriptions)
 
-    def _open(self, msg_type: Any, full_topic: str, profile: QoSProfile, writer: bool) -> Any:
+    def _ros_open(self, msg_type: Any, full_topic: str, profile: QoSProfile, writer: bool) -> Any:
         """Make a writer or reader and announce it as this node's."""
         check_is_valid_msg_type(msg_type)
         raw = profile.avoid_ros_namespace_conventions
@@ -222,7 +225,7 @@ class EntityHolder:
         endpoint: Any = create(
             dds_topic, dds_type_name(name), registry.type_hash(name), profile.decide(peers, writer)
         )
-        self._announce(**{"writer" if writer else "reader": endpoint})
+        self._ros_announce(**{"writer" if writer else "reader": endpoint})
         return endpoint
 
     def create_client(
@@ -241,7 +244,7 @@ class EntityHolder:
         check_is_valid_srv_type(srv_type)
         group = callback_group or self._default_callback_group
         client = Client(cast("Node", self), srv_type, srv_name, qos_profile, group)
-        return self._keep(client, self._clients)
+        return self._ros_keep(client, self._clients)
 
     def create_service(
         self,
@@ -260,9 +263,9 @@ class EntityHolder:
         check_is_valid_srv_type(srv_type)
         group = callback_group or self._default_callback_group
         service = Service(cast("Node", self), srv_type, srv_name, callback, group, qos_profile)
-        return self._keep(service, self._services)
+        return self._ros_keep(service, self._services)
 
-    def _keep(self, entity: Any, known: list[Any]) -> Any:
+    def _ros_keep(self, entity: Any, known: list[Any]) -> Any:
         """Have the executor serve a new entity."""
         entity.callback_group.add_entity(entity)
         known.append(entity)
@@ -289,7 +292,7 @@ class EntityHolder:
             autostart=autostart,
         )
         timer._wake = self._wake_executor
-        return self._keep(timer, self._timers)
+        return self._ros_keep(timer, self._timers)
 
     def create_guard_condition(
         self, callback: Callable[..., Any], callback_group: CallbackGroup | None = None
@@ -299,7 +302,7 @@ class EntityHolder:
         group = callback_group or self._default_callback_group
         guard = GuardCondition(callback, group, context=self._context)
         guard._wake = self._wake_executor
-        return self._keep(guard, self._guards)
+        return self._ros_keep(guard, self._guards)
 
     def create_rate(self, frequency: float, clock: Clock | None = None) -> Rate:
         """Make a rate in Hz.
@@ -311,7 +314,7 @@ class EntityHolder:
         timer = self.create_timer(1.0 / frequency, None, self._rate_group, clock)
         return Rate(timer, context=self._context)
 
-    def _restart_timers(self, clock: Clock) -> None:
+    def _ros_restart_timers(self, clock: Clock) -> None:
         for timer in self._timers:
             if timer.clock is clock:
                 timer.on_clock_jump()
@@ -319,13 +322,13 @@ class EntityHolder:
 
     def destroy_publisher(self, publisher: Publisher) -> bool:
         """Destroy a publisher; False when it is not of this node."""
-        return self._destroy(publisher, self._publishers)
+        return self._ros_destroy(publisher, self._publishers)
 
     def destroy_subscription(self, subscription: Subscription) -> bool:
         """Destroy a subscription; False when it is not of this node."""
-        return self._destroy(subscription, self._subscriptions)
+        return self._ros_destroy(subscription, self._subscriptions)
 
-    def _destroy(self, entity: Any, known: list[Any]) -> bool:
+    def _ros_destroy(self, entity: Any, known: list[Any]) -> bool:
         if entity not in known:
             return False
         known.remove(entity)
@@ -337,26 +340,26 @@ class EntityHolder:
 
     def destroy_client(self, client: Client) -> bool:
         """Destroy a service client; False when it is not of this node."""
-        return self._destroy(client, self._clients)
+        return self._ros_destroy(client, self._clients)
 
     def destroy_service(self, service: Service) -> bool:
         """Destroy a service server; False when it is not of this node."""
-        return self._destroy(service, self._services)
+        return self._ros_destroy(service, self._services)
 
     def destroy_timer(self, timer: Timer) -> bool:
         """Destroy a timer; False when it is not of this node."""
-        return self._destroy(timer, self._timers)
+        return self._ros_destroy(timer, self._timers)
 
     def destroy_guard_condition(self, guard: GuardCondition) -> bool:
         """Destroy a guard condition; False when it is not of this node."""
-        return self._destroy(guard, self._guards)
+        return self._ros_destroy(guard, self._guards)
 
     def destroy_rate(self, rate: Rate) -> bool:
         """Destroy a rate and its timer; False when it is not of this node."""
         rate.destroy()
         return self.destroy_timer(rate._timer)
 
-    def _destroy_entities(self, orphan: bool) -> None:
+    def _ros_destroy_entities(self, orphan: bool) -> None:
         """Destroy everything that was made here; `orphan`: because the context was shut down."""
         made: tuple[list[Any], ...]
         made = (
@@ -371,7 +374,7 @@ class EntityHolder:
         for entity in everything:
             entity.destroy()
             if orphan:
-                entity._orphaned = True
+                entity._ros_orphaned = True
                 entity._endpoint = entity._writer = ENDED
         for known in (*made, self._waitables):
             known.clear()

@@ -51,13 +51,13 @@ class GraphViewer:
     def resolve_service_name(self, service: str, *, only_expand: bool = False) -> str:
         raise NotImplementedError
 
-    def _endpoints(self) -> list[Endpoint]:
+    def _ros_endpoints(self) -> list[Endpoint]:
         return self._context.graph.endpoints()
 
     def get_topic_names_and_types(self, no_demangle: bool = False) -> NamesAndTypes:
         """All topics and their types; ``no_demangle`` gives the middleware's names."""
         pairs = []
-        for endpoint in self._endpoints():
+        for endpoint in self._ros_endpoints():
             kind, name = split_topic(endpoint.topic)
             if no_demangle:
                 if not endpoint.topic.startswith("DCPS"):
@@ -68,10 +68,10 @@ class GraphViewer:
 
     def get_service_names_and_types(self) -> NamesAndTypes:
         """All services and their types."""
-        pairs = [_service_pair(e, "request") for e in self._endpoints()]
+        pairs = [_service_pair(e, "request") for e in self._ros_endpoints()]
         return _collect([pair for pair in pairs if pair])
 
-    def _of_node(self, node_name: str, node_namespace: str) -> list[Endpoint]:
+    def _ros_of_node(self, node_name: str, node_namespace: str) -> list[Endpoint]:
         entries = [
             n for n in self._context.graph.nodes() if n.key == (node_namespace or "/", node_name)
         ]
@@ -81,13 +81,13 @@ class GraphViewer:
                 f"{node_namespace}/{node_name}"
             )
         guids = {guid for entry in entries for guid in [*entry.readers, *entry.writers]}
-        return [endpoint for endpoint in self._endpoints() if endpoint.guid in guids]
+        return [endpoint for endpoint in self._ros_endpoints() if endpoint.guid in guids]
 
-    def _topics_of_node(
+    def _ros_topics_of_node(
         self, node_name: str, node_namespace: str, readers: bool, raw: bool
     ) -> NamesAndTypes:
         pairs = []
-        for endpoint in self._of_node(node_name, node_namespace):
+        for endpoint in self._ros_of_node(node_name, node_namespace):
             kind, name = split_topic(endpoint.topic)
             if endpoint.is_reader == readers and (raw or kind == "topic"):
                 named = (endpoint.topic, endpoint.type_name)
@@ -101,7 +101,7 @@ class GraphViewer:
 
         :raises NodeNameNonExistentError: no such node is known.
         """
-        return self._topics_of_node(node_name, node_namespace, False, no_demangle)
+        return self._ros_topics_of_node(node_name, node_namespace, False, no_demangle)
 
     def get_subscriber_names_and_types_by_node(
         self, node_name: str, node_namespace: str, no_demangle: bool = False
@@ -110,7 +110,7 @@ class GraphViewer:
 
         :raises NodeNameNonExistentError: no such node is known.
         """
-        return self._topics_of_node(node_name, node_namespace, True, no_demangle)
+        return self._ros_topics_of_node(node_name, node_namespace, True, no_demangle)
 
     def get_service_names_and_types_by_node(
         self, node_name: str, node_namespace: str
@@ -119,7 +119,7 @@ class GraphViewer:
 
         :raises NodeNameNonExistentError: no such node is known.
         """
-        readers = [e for e in self._of_node(node_name, node_namespace) if e.is_reader]
+        readers = [e for e in self._ros_of_node(node_name, node_namespace) if e.is_reader]
         return _collect([pair for pair in (_service_pair(e, "request") for e in readers) if pair])
 
     def get_client_names_and_types_by_node(
@@ -129,7 +129,7 @@ class GraphViewer:
 
         :raises NodeNameNonExistentError: no such node is known.
         """
-        readers = [e for e in self._of_node(node_name, node_namespace) if e.is_reader]
+        readers = [e for e in self._ros_of_node(node_name, node_namespace) if e.is_reader]
         return _collect([pair for pair in (_service_pair(e, "reply") for e in readers) if pair])
 
     def get_node_names_and_namespaces(self) -> list[tuple[str, str]]:
@@ -149,10 +149,10 @@ class GraphViewer:
         pairs = self.get_node_names_and_namespaces()
         return [f"{namespace.rstrip('/')}/{name}" for name, namespace in pairs]
 
-    def _matching(self, topic: str, readers: bool) -> list[Endpoint]:
-        return [e for e in self._endpoints() if e.is_reader == readers and e.topic == topic]
+    def _ros_matching(self, topic: str, readers: bool) -> list[Endpoint]:
+        return [e for e in self._ros_endpoints() if e.is_reader == readers and e.topic == topic]
 
-    def _queried(self, name: str, service: bool = False, remap: bool = False) -> str:
+    def _ros_queried(self, name: str, service: bool = False, remap: bool = False) -> str:
         resolve = self.resolve_service_name if service else self.resolve_topic_name
         try:
             return resolve(name, only_expand=not remap)
@@ -162,33 +162,38 @@ class GraphViewer:
 
     def count_publishers(self, topic_name: str) -> int:
         """How many publishers a topic has; its name is expanded but not remapped."""
-        return len(self._matching("rt" + self._queried(topic_name), False))
+        return len(self._ros_matching("rt" + self._ros_queried(topic_name), False))
 
     def count_subscribers(self, topic_name: str) -> int:
         """How many subscriptions a topic has; its name is expanded but not remapped."""
-        return len(self._matching("rt" + self._queried(topic_name), True))
+        return len(self._ros_matching("rt" + self._ros_queried(topic_name), True))
 
-    def _count_readers(self, service_name: str, kind: str) -> int:
-        full = self._queried(service_name, service=True)
-        pairs = [_service_pair(e, kind) for e in self._endpoints() if e.is_reader]
+    def _ros_count_readers(self, service_name: str, kind: str) -> int:
+        full = self._ros_queried(service_name, service=True)
+        pairs = [_service_pair(e, kind) for e in self._ros_endpoints() if e.is_reader]
         return sum(pair is not None and pair[0] == full for pair in pairs)
 
     def count_clients(self, service_name: str) -> int:
         """How many clients a service has; its name is expanded but not remapped."""
-        return self._count_readers(service_name, "reply")
+        return self._ros_count_readers(service_name, "reply")
 
     def count_services(self, service_name: str) -> int:
         """How many servers a service has; its name is expanded but not remapped."""
-        return self._count_readers(service_name, "request")
+        return self._ros_count_readers(service_name, "request")
 
-    def _infos(self, topic_name: str, no_mangle: bool, readers: bool) -> list[TopicEndpointInfo]:
-        topic = topic_name if no_mangle else "rt" + self._queried(topic_name, remap=True)
+    def _ros_infos(
+        self, topic_name: str, no_mangle: bool, readers: bool
+    ) -> list[TopicEndpointInfo]:
+        topic = topic_name if no_mangle else "rt" + self._ros_queried(topic_name, remap=True)
         graph = self._context.graph
         nodes = graph.nodes()
-        return [self._info(e, graph.owner(e.guid, nodes)) for e in self._matching(topic, readers)]
+        return [
+            self._ros_info(e, graph.owner(e.guid, nodes))
+            for e in self._ros_matching(topic, readers)
+        ]
 
     @staticmethod
-    def _info(endpoint: Endpoint, owner: NodeEntry | None) -> TopicEndpointInfo:
+    def _ros_info(endpoint: Endpoint, owner: NodeEntry | None) -> TopicEndpointInfo:
         kind = (
             TopicEndpointTypeEnum.SUBSCRIPTION
             if endpoint.is_reader
@@ -208,7 +213,7 @@ class GraphViewer:
         self, topic_name: str, no_mangle: bool = False
     ) -> list[TopicEndpointInfo]:
         """What is known of a topic's publishers; ``no_mangle``: by the middleware's name."""
-        return self._infos(topic_name, no_mangle, False)
+        return self._ros_infos(topic_name, no_mangle, False)
 
     def get_subscriptions_info_by_topic(
         self, topic_name: str, no_mangle: bool = False
@@ -216,7 +221,7 @@ class GraphViewer:
         """What is known of a topic's subscriptions; ``no_mangle`` takes the middleware's topic
         name.
         """
-        return self._infos(topic_name, no_mangle, True)
+        return self._ros_infos(topic_name, no_mangle, True)
 
     def wait_for_node(self, fully_qualified_node_name: str, timeout: float) -> bool:
         """Wait until a node is in the graph; False after ``timeout`` seconds."""

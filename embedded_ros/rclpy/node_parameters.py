@@ -103,7 +103,7 @@ class ParameterHolder:
         if declared:
             raise ParameterAlreadyDeclaredException(declared)
         for parameter in wanted:
-            result = self._set_checked([parameter], descriptors, allow_not_set_type=True)
+            result = self._ros_set_checked([parameter], descriptors, allow_not_set_type=True)
             if not result.successful:
                 if result.reason.startswith("Wrong parameter type"):
                     expected = Parameter.Type(descriptors[parameter.name].type).name
@@ -141,11 +141,11 @@ class ParameterHolder:
 
     def get_parameter_types(self, names: list[str]) -> list[Any]:
         """The types of several parameters."""
-        self._check_names(names)
+        self._ros_check_names(names)
         return [self.get_parameter_type(name) for name in names]
 
     @staticmethod
-    def _check_names(names: list[str]) -> None:
+    def _ros_check_names(names: list[str]) -> None:
         if not all(isinstance(name, str) for name in names):
             raise TypeError("All names must be instances of type str")
 
@@ -166,7 +166,7 @@ class ParameterHolder:
 
     def get_parameters(self, names: list[str]) -> list[Parameter]:
         """Several parameters; see :meth:`get_parameter`."""
-        self._check_names(names)
+        self._ros_check_names(names)
         return [self.get_parameter(name) for name in names]
 
     def get_parameter_or(self, name: str, alternative_value: Parameter | None = None) -> Parameter:
@@ -217,9 +217,9 @@ class ParameterHolder:
         unknown = [p.name for p in parameter_list if p.name not in self._parameters]
         if unknown and not self._allow_undeclared_parameters:
             raise ParameterNotDeclaredException(unknown)
-        return self._set_checked(parameter_list)
+        return self._ros_set_checked(parameter_list)
 
-    def _set_checked(
+    def _ros_set_checked(
         self,
         parameter_list: list[Parameter],
         descriptors: dict[str, Any] | None = None,
@@ -333,7 +333,7 @@ class ParameterHolder:
         for candidate in candidates:
             result = apply_descriptor(candidate, descriptor, True, False)
             if result.successful:
-                result = self._set_checked([candidate], {name: descriptor})
+                result = self._ros_set_checked([candidate], {name: descriptor})
             if result.successful:
                 return self.get_parameter(name).get_parameter_value()
         raise InvalidParameterValueException(name, candidates[-1].value, result.reason)

@@ -30,8 +30,10 @@ class Publisher(Destroyable):
         callback_group: Any,
     ) -> None:
         self._node = node
-        self._full_topic = node._full_name(topic)
-        self._endpoint: Writer = node._open(msg_type, self._full_topic, qos_profile, writer=True)
+        self._full_topic = node._ros_full_name(topic)
+        self._endpoint: Writer = node._ros_open(
+            msg_type, self._full_topic, qos_profile, writer=True
+        )
         self._serialize = registry.serializer(msg_type)
         self.msg_type = msg_type
         self.topic = topic
@@ -82,7 +84,7 @@ class Publisher(Destroyable):
         """Leave the topic; use :meth:`rclpy.node.Node.destroy_publisher`."""
         for handler in self.event_handlers:
             handler.destroy()
-        if not self._destroyed:
+        if not self._ros_destroyed:
             super().destroy()
-            self._node._announce(writer=self._endpoint, remove=True)
+            self._node._ros_announce(writer=self._endpoint, remove=True)
             self._endpoint.close()

@@ -105,11 +105,8 @@ class _OldName:
     def __init__(self, old: str, new: str) -> None:
         self._old, self._new = old, new
 
-    def __get__(self, value: object, policy: type[QoSPolicyEnum]) -> QoSPolicyEnum:
-        name = policy.__name__
-        warnings.warn(
-            f"{name}.{self._old} is deprecated. Use {name}.{self._new} instead.", stacklevel=2
-        )
+    def __get__(self, _: object, policy: type[QoSPolicyEnum]) -> QoSPolicyEnum:
+        warnings.warn(f"{self._old} is deprecated. Use {self._new} instead.", stacklevel=2)
         return policy[self._new]
 
 

@@ -44,7 +44,9 @@ class Introspection:
         self._type = event_type
         self._serialize = registry.serializer(event_type)
         # Not among the node's publishers, as in ROS.
-        self._writer = node._open(event_type, service + "/_service_event", qos_profile, writer=True)
+        self._writer = node._ros_open(
+            event_type, service + "/_service_event", qos_profile, writer=True
+        )
 
     def publish(self, event_type: int, request_id: rmw_request_id_t, message: Any) -> None:
         """Tell of a request or response."""
@@ -65,5 +67,5 @@ class Introspection:
 
     def close(self) -> None:
         """Publish no more."""
-        self._node._announce(writer=self._writer, remove=True)
+        self._node._ros_announce(writer=self._writer, remove=True)
         self._writer.close()

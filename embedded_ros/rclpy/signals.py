@@ -106,5 +106,5 @@ class SignalHandlerGuardCondition(GuardCondition):
 
     def wake(self) -> None:
         """Trigger, unless destroyed."""
-        if not self._destroyed:
+        if not self._ros_destroyed:
             self.trigger()

@@ -49,8 +49,8 @@ class Subscription(QueuedEntity):
     ) -> None:
         self.callback = callback
         self._node = node
-        self._full_topic = node._full_name(topic)
-        reader: Reader = node._open(msg_type, self._full_topic, qos_profile, writer=False)
+        self._full_topic = node._ros_full_name(topic)
+        reader: Reader = node._ros_open(msg_type, self._full_topic, qos_profile, writer=False)
         keep_all = qos_profile.history == HistoryPolicy.KEEP_ALL
         super().__init__(reader, None if keep_all else max(qos_profile.depth, 1))
         self._deserialize = registry.deserializer(msg_type)
@@ -129,6 +129,6 @@ class Subscription(QueuedEntity):
         """Leave the topic; use :meth:`rclpy.node.Node.destroy_subscription`."""
         for handler in self.event_handlers:
             handler.destroy()
-        if not self._destroyed:
-            self._node._announce(reader=self._endpoint, remove=True)
+        if not self._ros_destroyed:
+            self._node._ros_announce(reader=self._endpoint, remove=True)
             super().destroy()

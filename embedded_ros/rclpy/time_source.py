@@ -91,7 +91,7 @@ class TimeSource:
         clock._set_ros_time_is_active(self._active)
         node = self._get_node()
         if node is not None:
-            node._restart_timers(clock)
+            node._ros_restart_timers(clock)
 
     def attach_clock(self, clock: ROSClock) -> None:
         """Feed a clock.
@@ -110,7 +110,7 @@ class TimeSource:
         for clock in self._clocks:
             clock.set_ros_time_override(self._last)
             if node is not None and (before is None or self._last < before):
-                node._restart_timers(clock)
+                node._ros_restart_timers(clock)
 
     def _on_parameters(self, parameters: list[Parameter]) -> Any:
         for parameter in parameters:

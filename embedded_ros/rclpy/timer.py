@@ -96,7 +96,7 @@ class Timer(Destroyable):
 
     def has_work(self) -> bool:
         """Whether an executor is to call back."""
-        return not self._destroyed and self.is_ready()
+        return not self._ros_destroyed and self.is_ready()
 
     def take_work(self) -> Work | None:
         """Note that the callback is being called, and return what is to be run."""

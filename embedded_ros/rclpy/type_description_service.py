@@ -51,7 +51,7 @@ class TypeDescriptionService:
     def _used(self) -> Iterator[str]:
         """The interfaces that the node uses."""
         node = self._node
-        if node._rosout is not None:
+        if node._ros_rosout is not None:
             yield "rcl_interfaces/msg/Log"
         topic_ends: list[Any] = [*node._publishers, *node._subscriptions]
         for topic_end in topic_ends:

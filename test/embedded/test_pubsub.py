@@ -9,6 +9,7 @@ from geometry_msgs.msg import Pose, PoseArray
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.duration import Duration
 from rclpy.exceptions import InvalidTopicNameException
+from rclpy.node import Node
 from rclpy.qos import (
     DurabilityPolicy,
     LivelinessPolicy,
@@ -255,3 +256,31 @@ def test_what_is_left_after_a_shutdown(node, context):
         with pytest.raises(RCLError):
             use()
     publisher.destroy()
+
+
+class Hoarder(Node):
+    """A node with attributes of its own, under names that programs like."""
+
+    def __init__(self, **kwargs):
+        super().__init__("hoarder", **kwargs)
+        self._name = self._namespace = self._info = self._entry = self._arguments = None
+        self._open = self._destroyed = self._released = self._public = self._profile = True
+
+    def _keep(self):
+        raise AssertionError
+
+    _destroy = _announce = _release = _full_name = _endpoints = _keep
+
+
+def test_attributes_of_users_do_no_harm(context, spin):
+    node = Hoarder(context=context)
+    got = []
+    node.create_subscription(String, "words", got.append, 1)
+    publisher = node.create_publisher(String, "words", 1)
+    assert spin(lambda: publisher.get_subscription_count() == 1, node)
+    publisher.publish(String(data="a"))
+    assert spin(lambda: got, node)
+    assert node.get_fully_qualified_name() == "/hoarder"
+    assert spin(lambda: node.get_publishers_info_by_topic("words"), node)
+    assert node.destroy_publisher(publisher)
+    node.destroy_node()

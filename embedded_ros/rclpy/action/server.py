@@ -130,7 +130,7 @@ class ActionServer(ActionEnd):
         full, node = self._prefix + name, self._node
         service = AnsweringService(node, srv_type, full, callback, self.callback_group, qos)
         self._destroyers[service] = node.destroy_service
-        node._keep(service, node._services)
+        node._ros_keep(service, node._services)
 
     @property
     def action_type(self) -> Any:

@@ -68,7 +68,7 @@ class ActionEnd(Waitable):
         self._prefix = f"{action_name}/_action/"
         self._destroyers: dict[Any, Callable[[Any], bool]] = {}
         try:
-            node._full_name(self._prefix + "send_goal" if action_name else "", service=True)
+            node._ros_full_name(self._prefix + "send_goal" if action_name else "", service=True)
         except NameValidationException as error:
             raise ValueError(
                 f"Failed to create action {role} due to invalid topic name '{action_name}': {error}"

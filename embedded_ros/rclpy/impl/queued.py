@@ -36,7 +36,7 @@ class QueuedEntity(Destroyable):
     @property
     def reader(self) -> Reader | None:
         """The reader, None once destroyed."""
-        return None if self._destroyed else self._endpoint
+        return None if self._ros_destroyed else self._endpoint
 
     def drain(self) -> None:
         """Fetch what has arrived."""

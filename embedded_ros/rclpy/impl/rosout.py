@@ -31,7 +31,7 @@ class Rosout:
         self._node = node
         self._serialize = registry.serializer(self._message)
         # Not among the node's publishers, as in ROS.
-        self._writer = node._open(self._message, "/rosout", _QOS, writer=True)
+        self._writer = node._ros_open(self._message, "/rosout", _QOS, writer=True)
         self._busy = threading.local()
         sinks = rcutils_logger.sinks.setdefault(node.get_logger().name, [])
         # Nodes of one name share the list; each publishes, as in ROS.
@@ -68,5 +68,5 @@ class Rosout:
                 sinks.remove(self._publish)
             if not sinks:
                 del rcutils_logger.sinks[name]
-        self._node._announce(writer=self._writer, remove=True)
+        self._node._ros_announce(writer=self._writer, remove=True)
         self._writer.close()

@@ -66,7 +66,7 @@ class ServiceEnd(QueuedEntity):
     def __init__(
         self, node: Node, srv_type: Any, srv_name: str, qos_profile: QoSProfile, role: str
     ) -> None:
-        self._full_name = node._full_name(srv_name, service=True)
+        self._full_name = node._ros_full_name(srv_name, service=True)
         self._node = node
         self.srv_type = srv_type
         self.srv_name = srv_name
@@ -86,7 +86,7 @@ class ServiceEnd(QueuedEntity):
         keep_all = qos_profile.history == HistoryPolicy.KEEP_ALL
         super().__init__(reader, None if keep_all else max(qos_profile.depth, 1))
         self._introspection: Introspection | None = None
-        node._announce(writer=self._writer, reader=reader)
+        node._ros_announce(writer=self._writer, reader=reader)
 
     def _arguments(self, topic: str, msg_type: Any) -> tuple[Any, ...]:
         name = msg_type._spec_.name
@@ -147,11 +147,11 @@ class ServiceEnd(QueuedEntity):
 
     def destroy(self) -> None:
         """Leave the service; use the node's method for it."""
-        if self._destroyed:
+        if self._ros_destroyed:
             return
         if self._introspection is not None:
             self._introspection.close()
             self._introspection = None
-        self._node._announce(writer=self._writer, reader=self._endpoint, remove=True)
+        self._node._ros_announce(writer=self._writer, reader=self._endpoint, remove=True)
         self._writer.close()
         super().destroy()

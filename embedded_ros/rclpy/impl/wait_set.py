@@ -60,7 +60,7 @@ class WaitSet:
         if isinstance(member, guard_condition.GuardCondition):
             triggered, member._executor_triggered = member._executor_triggered, False
             return triggered
-        return not member._destroyed and bool(member.is_ready())
+        return not member._ros_destroyed and bool(member.is_ready())
 
     def wait(self, timeout_nsec: int) -> None:
         """Wait until a member is ready, or for so long; negative: without limit."""

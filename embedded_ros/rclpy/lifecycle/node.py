@@ -63,18 +63,18 @@ class LifecycleNodeMixin(ManagedEntity, _Base):
                 f"{enable_communication_interface!r}"
             )
         self._managed_entities: list[ManagedEntity] = []
-        self._state_machine = StateMachine(self._publish_event)
-        self._event_publisher = Node.create_publisher(
+        self._state_machine = StateMachine(self._ros_publish_event)
+        self._ros_event_publisher = Node.create_publisher(
             self, TransitionEvent, "~/transition_event", 10
         )
         if not enable_communication_interface:
             return
         for srv_type, name, answer in (
-            (ChangeState, "change_state", self._on_change_state),
-            (GetState, "get_state", self._on_get_state),
-            (GetAvailableStates, "get_available_states", self._on_get_states),
-            (GetAvailableTransitions, "get_available_transitions", self._on_get_transitions),
-            (GetAvailableTransitions, "get_transition_graph", self._on_get_graph),
+            (ChangeState, "change_state", self._ros_on_change_state),
+            (GetState, "get_state", self._ros_on_get_state),
+            (GetAvailableStates, "get_available_states", self._ros_on_get_states),
+            (GetAvailableTransitions, "get_available_transitions", self._ros_on_get_transitions),
+            (GetAvailableTransitions, "get_transition_graph", self._ros_on_get_graph),
         ):
             service = Node.create_service(
                 self, srv_type, f"~/{name}", answer, callback_group=callback_group
@@ -87,51 +87,51 @@ class LifecycleNodeMixin(ManagedEntity, _Base):
 
         :raises RCLError: the node is in another state; so do the others below.
         """
-        return self._change_state("configure")
+        return self._ros_change_state("configure")
 
     def trigger_cleanup(self) -> TransitionCallbackReturn:
         """Go from *inactive* to *unconfigured*."""
-        return self._change_state("cleanup")
+        return self._ros_change_state("cleanup")
 
     def trigger_shutdown(self) -> TransitionCallbackReturn:
         """Go to *finalized*."""
-        return self._change_state("shutdown")
+        return self._ros_change_state("shutdown")
 
     def trigger_activate(self) -> TransitionCallbackReturn:
         """Go from *inactive* to *active*."""
-        return self._change_state("activate")
+        return self._ros_change_state("activate")
 
     def trigger_deactivate(self) -> TransitionCallbackReturn:
         """Go from *active* to *inactive*."""
-        return self._change_state("deactivate")
+        return self._ros_change_state("deactivate")
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Configure; the node was in `state`."""
-        return self._tell_entities("on_configure", state)
+        return self._ros_tell_entities("on_configure", state)
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Undo what was configured."""
-        return self._tell_entities("on_cleanup", state)
+        return self._ros_tell_entities("on_cleanup", state)
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
         """End."""
-        return self._tell_entities("on_shutdown", state)
+        return self._ros_tell_entities("on_shutdown", state)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Start to work."""
-        return self._tell_entities("on_activate", state)
+        return self._ros_tell_entities("on_activate", state)
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Stop to work."""
-        return self._tell_entities("on_deactivate", state)
+        return self._ros_tell_entities("on_deactivate", state)
 
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Recover from an error of another callback: success leads to *unconfigured*, all else to
         *finalized*.
         """
-        return self._tell_entities("on_error", state)
+        return self._ros_tell_entities("on_error", state)
 
-    def _tell_entities(self, name: str, state: LifecycleState) -> TransitionCallbackReturn:
+    def _ros_tell_entities(self, name: str, state: LifecycleState) -> TransitionCallbackReturn:
         for entity in self._managed_entities:
             result = getattr(entity, name)(state)
             if not isinstance(result, TransitionCallbackReturn):
@@ -172,18 +172,18 @@ class LifecycleNodeMixin(ManagedEntity, _Base):
             self._managed_entities.remove(publisher)
         return Node.destroy_publisher(self, publisher)
 
-    def _change_state(self, transition: int | str) -> TransitionCallbackReturn:
+    def _ros_change_state(self, transition: int | str) -> TransitionCallbackReturn:
         state_id, label = self._state_machine.current_state
         if label in _CALLBACKS:
             raise RCLError(f"no transition {transition!r}: the node is {label}")
         before = LifecycleState(label, state_id)
         self._state_machine.trigger(transition)
-        result = self._run_callback(before)
+        result = self._ros_run_callback(before)
         if result == TransitionCallbackReturn.ERROR:
-            self._run_callback(before)
+            self._ros_run_callback(before)
         return result
 
-    def _run_callback(self, before: LifecycleState) -> TransitionCallbackReturn:
+    def _ros_run_callback(self, before: LifecycleState) -> TransitionCallbackReturn:
         """Call what belongs to the present state and leave it accordingly."""
         name = _CALLBACKS[self._state_machine.current_state[1]]
         try:
@@ -196,14 +196,14 @@ class LifecycleNodeMixin(ManagedEntity, _Base):
         self._state_machine.trigger(result.to_label())
         return result
 
-    def _publish_event(self, start: str, goal: str) -> None:
+    def _ros_publish_event(self, start: str, goal: str) -> None:
         states = [State(id=STATES[label], label=label) for label in (start, goal)]
         event = TransitionEvent(start_state=states[0], goal_state=states[1])
-        self._event_publisher.publish(event)
+        self._ros_event_publisher.publish(event)
 
-    def _on_change_state(self, request: Any, response: Any) -> Any:
+    def _ros_on_change_state(self, request: Any, response: Any) -> Any:
         try:
-            result = self._change_state(request.transition.label or request.transition.id)
+            result = self._ros_change_state(request.transition.label or request.transition.id)
         except RCLError as error:
             self.get_logger().warning(str(error))
             response.success = False
@@ -211,19 +211,19 @@ class LifecycleNodeMixin(ManagedEntity, _Base):
             response.success = result == TransitionCallbackReturn.SUCCESS
         return response
 
-    def _on_get_state(self, request: Any, response: Any) -> Any:
+    def _ros_on_get_state(self, request: Any, response: Any) -> Any:
         response.current_state.id, response.current_state.label = self._state_machine.current_state
         return response
 
-    def _on_get_states(self, request: Any, response: Any) -> Any:
+    def _ros_on_get_states(self, request: Any, response: Any) -> Any:
         response.available_states = [State(id=n, label=label) for label, n in STATES.items()]
         return response
 
-    def _on_get_transitions(self, request: Any, response: Any) -> Any:
+    def _ros_on_get_transitions(self, request: Any, response: Any) -> Any:
         response.available_transitions = _messages(self._state_machine.available_transitions)
         return response
 
-    def _on_get_graph(self, request: Any, response: Any) -> Any:
+    def _ros_on_get_graph(self, request: Any, response: Any) -> Any:
         response.available_transitions = _messages(TRANSITIONS)
         return response
 
