@@ -129,7 +129,11 @@ class InterfaceFinder(MetaPathFinder):
             "_" + snake_case(name) for name in self.registry.names(package, parts[1])
         }:
             return None
-        return ModuleSpec(fullname, self.loader, is_package=len(parts) < 3)
+        spec = ModuleSpec(fullname, self.loader, is_package=len(parts) < 3)
+        if len(parts) == 1 and (folder := self.registry.folder(package)) is not None:
+            # Some carry Python modules too, which rosidl installs beside the generated ones.
+            spec.submodule_search_locations = [str(folder / package), str(folder / "src" / package)]
+        return spec
 
     def _foreign(self, package: str) -> bool:
         spec = sys.modules[package].__spec__

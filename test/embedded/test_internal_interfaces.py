@@ -221,3 +221,18 @@ def test_tools_know_custom_types():
         assert get_interface_path(name) == str(home / "srv" / "Ask.srv")
     with pytest.raises(LookupError, match="a file of"):
         get_interface_path("std_msgs/msg/String")
+
+
+def test_a_package_may_carry_python_modules(tmp_path):
+    home = tmp_path / "carrier_msgs"
+    files = {
+        "package.xml": "<package><name>carrier_msgs</name></package>",
+        "msg/Load.msg": "int32 mass",
+        "src/carrier_msgs/loads.py": "from carrier_msgs.msg import Load\nHEAVY = Load(mass=9)\n",
+    }
+    for name, text in files.items():
+        (home / name).parent.mkdir(parents=True, exist_ok=True)
+        (home / name).write_text(text)
+    embedded_ros.enable([home])
+    loads = importlib.import_module("carrier_msgs.loads")
+    assert importlib.import_module("carrier_msgs.msg").Load(mass=9) == loads.HEAVY
