@@ -39,10 +39,13 @@ def pytest_collection_modifyitems(config, items):
     """Leave out what takes ten minutes, and what the transport in use cannot do."""
     import rclpy
 
+    rmw = rclpy.get_rmw_implementation_identifier()
     for item in items:
+        if "fastrtps" in rmw and (marker := item.get_closest_marker("not_fast_dds")):
+            item.add_marker(pytest.mark.skip(reason=f"Fast DDS: {marker.args[0]}"))
         if item.get_closest_marker("soak") and not config.getoption("--soak"):
             item.add_marker(pytest.mark.skip(reason="takes ten minutes; --soak runs it"))
-    if rclpy.get_rmw_implementation_identifier() == "embedded_local":
+    if rmw == "embedded_local":
         skip = pytest.mark.skip(reason="nodes of other processes are not reached")
         for item in items:
             if item.get_closest_marker("processes"):

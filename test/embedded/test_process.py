@@ -104,6 +104,7 @@ def test_a_killed_process_is_forgotten_and_can_come_back(node, spin, program):
 
 
 @pytest.mark.processes
+@pytest.mark.not_fast_dds("a participant that was given up for lost stays so")
 def test_a_process_that_stood_still_comes_back(node, spin, program):
     got = []
     node.create_subscription(String, "chatter", got.append, 10)
@@ -134,6 +135,7 @@ def test_a_bad_discovery_range_is_named(program):
 
 
 @pytest.mark.processes
+@pytest.mark.not_fast_dds("reads no CYCLONEDDS_URI")
 def test_settings_the_middleware_refuses_end_init(program):
     code, _, err = program("talker.py", CYCLONEDDS_URI="file:///no/such/file.xml").finish()
     assert code != 0

@@ -135,10 +135,7 @@ def test_best_effort_subscription_hears_reliable_publisher(node, spin):
     assert spin(lambda: got, node)
 
 
-@pytest.mark.skipif(
-    "fastrtps" in rclpy.get_rmw_implementation_identifier(),
-    reason="rmw_fastrtps takes one type per topic in a participant",
-)
+@pytest.mark.not_fast_dds("one type per topic in a participant")
 def test_different_types_on_one_topic_do_not_mix(node, spin):
     got = []
     node.create_subscription(String, "mixed", got.append, 10)

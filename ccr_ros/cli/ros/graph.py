@@ -17,8 +17,9 @@ from ccr_ros.model.errors import CcrError
 NODE_PREFIX = "_ccr_cli"
 EXIT_TERMINATED = 143  # 128 + SIGTERM, as shells report it
 
-# The graph counts as known once it has not changed for _QUIET seconds.
-_QUIET, _LIMIT, _STEP = 0.5, 5.0, 0.05
+# The graph counts as known once it has not changed for _QUIET seconds; Fast DDS finds it in steps
+# that may be further apart.
+_QUIET, _QUIET_FAST_DDS, _LIMIT, _STEP = 0.5, 1.5, 5.0, 0.05
 
 NamesAndTypes = list[tuple[str, list[str]]]
 
@@ -98,6 +99,10 @@ def spin_until(node: Any, done: Callable[[], bool], limit: float | None = None) 
 
 def _settle(node: Any) -> None:
     """Wait until what is known of the graph does not change any more."""
+    from rclpy.utilities import get_rmw_implementation_identifier
+
+    fast_dds = "fastrtps" in get_rmw_implementation_identifier()
+    wanted = _QUIET_FAST_DDS if fast_dds else _QUIET
     seen: Any = None
     since = time.monotonic()
 
@@ -110,7 +115,7 @@ def _settle(node: Any) -> None:
         )
         if now != seen:
             seen, since = now, time.monotonic()
-        return time.monotonic() - since >= _QUIET
+        return time.monotonic() - since >= wanted
 
     spin_until(node, quiet, _LIMIT)
 
