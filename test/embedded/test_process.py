@@ -104,7 +104,7 @@ def test_a_killed_process_is_forgotten_and_can_come_back(node, spin, program):
 
 
 @pytest.mark.processes
-@pytest.mark.not_fast_dds("a participant that was given up for lost stays so")
+@pytest.mark.not_fast_dds("a lost participant is not back after 15 s")
 def test_a_process_that_stood_still_comes_back(node, spin, program):
     got = []
     node.create_subscription(String, "chatter", got.append, 10)

@@ -4,7 +4,6 @@
 import signal
 
 import pytest
-import rclpy
 from geometry_msgs.msg import Pose, PoseArray
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.duration import Duration

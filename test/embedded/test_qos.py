@@ -110,6 +110,7 @@ def test_refused_peers_are_told_of(node, spin):
         assert info.last_policy_kind == QoSPolicyKind.RELIABILITY
 
 
+@pytest.mark.not_fast_dds("tells of no liveliness when a publisher is found")
 def test_liveliness_and_deadline_events(node, spin):
     alive, missed = [], []
     callbacks = SubscriptionEventCallbacks(liveliness=alive.append, deadline=missed.append)
