@@ -2,6 +2,7 @@
 """A node for the commands to look at, and ways to run them."""
 
 import gc
+import io
 import subprocess
 import sys
 import threading
@@ -18,11 +19,23 @@ ROOT = Path(__file__).resolve().parents[2]
 Done = namedtuple("Done", "code out err")
 
 
+# Real rclpy on Fast DDS often finds nothing from the second participant of a process on, within
+# the time that a command takes.
+IN_THIS_PROCESS = "fastrtps" not in rclpy.get_rmw_implementation_identifier()
+
+
 @pytest.fixture
 def ccr(capsys):
-    """Run a command in this process; gives exit code, output and errors."""
+    """Run a command, in this process if that works; gives exit code, output and errors."""
 
     def run(*words):
+        if not IN_THIS_PROCESS:
+            given = sys.stdin.getvalue() if isinstance(sys.stdin, io.StringIO) else ""
+            command = [sys.executable, "-m", "ccr_ros.cli", *words]
+            done = subprocess.run(
+                command, input=given, capture_output=True, text=True, cwd=ROOT, check=False
+            )
+            return Done(done.returncode, done.stdout, done.stderr)
         capsys.readouterr()
         try:
             code = main(list(words))
