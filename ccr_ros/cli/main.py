@@ -2,8 +2,10 @@
 """Entry point of ``ccr``: finds the command, imports its module only, and runs it.
 
 A command module has a docstring (its help), ``add_arguments(parser)`` and
-``run(args) -> int``. One that hands arguments on to another program also has ``OWN_FLAGS``:
-arguments from the first that is not among them on are not parsed, but put in ``args.rest``.
+``run(args) -> int``. One whose first argument is a command again has, instead of both,
+``COMMANDS``, a table like the one here. One that hands arguments on to another program also
+has ``OWN_FLAGS``: arguments from the first that is not among them on are not parsed, but put in
+``args.rest``.
 """
 
 from __future__ import annotations
@@ -22,6 +24,10 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "demo": ("ccr_ros.cli.demo", "three fingers move on a ROS graph; leaves pictures and a replay"),
     "test": ("ccr_ros.cli.test", "run the linters, the type checker and the tests"),
     "solve": ("ccr_ros.cli.solve", "solve one finger for given cable pulls"),
+    "design": (
+        "ccr_ros.cli.design",
+        "rest shapes, routings, pulls and grippers for a wanted shape",
+    ),
     "bench": ("ccr_ros.cli.bench", "measure speed and accuracy next to other solvers"),
     "run": ("ccr_ros.cli.run", "run a node"),
     "topic": ("ccr_ros.cli.ros.topic", "list, echo, publish and measure topics"),
@@ -64,38 +70,63 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _dispatch(argv: list[str]) -> int:
-    parser = argparse.ArgumentParser(
-        prog="ccr",
-        usage="ccr COMMAND ...",
-        description="Grippers with cable-driven continuum fingers.",
-        epilog="commands:\n"
-        + "\n".join(f"  {name:<10} {text}" for name, (_, text) in COMMANDS.items())
-        + "\n\n`ccr COMMAND --help` tells more.",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+    return _run_one_of(
+        COMMANDS,
+        "ccr",
+        argparse.ArgumentParser(
+            prog="ccr",
+            usage="ccr COMMAND ...",
+            description="Grippers with cable-driven continuum fingers.",
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        ),
+        argv,
     )
-    parser.add_argument("--version", action="version", version=f"ccr_ros {__version__}")
+
+
+def _run_one_of(
+    commands: dict[str, tuple[str, str]],
+    name: str,
+    parser: argparse.ArgumentParser,
+    argv: list[str],
+) -> int:
+    """Run the command of a table that the arguments begin with; its module alone is imported."""
+    width = max(10, *(len(command) for command in commands))
+    parser.epilog = (
+        "commands:\n"
+        + "\n".join(f"  {command:<{width}} {text}" for command, (_, text) in commands.items())
+        + f"\n\n`{name} COMMAND --help` tells more."
+    )
+    if name == "ccr":
+        parser.add_argument("--version", action="version", version=f"ccr_ros {__version__}")
     parser.add_argument("command", nargs="?", help=argparse.SUPPRESS)
     parser.add_argument("rest", nargs=argparse.REMAINDER, help=argparse.SUPPRESS)
     top = parser.parse_args(argv)
     if top.command is None:
         parser.print_help()
         return 0
-    if top.command not in COMMANDS:
-        parser.error(f"unknown command {top.command!r}; valid: {', '.join(COMMANDS)}")
+    if top.command not in commands:
+        parser.error(f"unknown command {top.command!r}; valid: {', '.join(commands)}")
 
-    module_name, summary = COMMANDS[top.command]
+    module_name, summary = commands[top.command]
     module = importlib.import_module(module_name)
     # REMAINDER would lose a leading `--`: take the command's arguments as they were given.
-    args = _parse(top.command, summary, module, argv[argv.index(top.command) + 1 :])
-    return int(module.run(args) or 0)
-
-
-def _parse(name: str, summary: str, module: ModuleType, argv: list[str]) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(
-        prog=f"ccr {name}",
+    rest = argv[argv.index(top.command) + 1 :]
+    below = argparse.ArgumentParser(
+        prog=f"{name} {top.command}",
         description=_help_of(module, summary),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
+    table: dict[str, tuple[str, str]] | None = getattr(module, "COMMANDS", None)
+    if table is not None:
+        below.usage = f"{below.prog} COMMAND ..."
+        return _run_one_of(table, below.prog, below, rest)
+    args = _parse(below, module, rest)
+    return int(module.run(args) or 0)
+
+
+def _parse(
+    parser: argparse.ArgumentParser, module: ModuleType, argv: list[str]
+) -> argparse.Namespace:
     module.add_arguments(parser)
     own_flags: tuple[str, ...] | None = getattr(module, "OWN_FLAGS", None)
     if own_flags is None:
