@@ -89,7 +89,7 @@ def test_refused(values, place, words):
 
 def test_points_that_no_finger_of_this_length_can_span():
     shape = DesiredShape(changed(STRAIGHT, 5, STRAIGHT[5] + np.array([0.001, 0, 0])))
-    with pytest.raises(InvalidValue, match=r"points\[5\].*it is 0.024708 mm farther"):
+    with pytest.raises(InvalidValue, match=r"points\[5\].*it is 0.0247102 mm farther"):
         shape.check_fits(make_finger())
     with pytest.raises(InvalidValue, match=r"9 points, one per disk of finger 'finger' \(got 10\)"):
         DesiredShape(STRAIGHT).check_fits(make_finger(straight_cable(4, 9), segments=8))
