@@ -22,6 +22,13 @@ CYCLONE_WHEELS = (
     "(sys_platform == 'darwin' or platform_machine == 'x86_64' or platform_machine == 'AMD64')"
 )
 
+# What not every user needs: one extra each.
+FEATURES = {
+    "plot": ["matplotlib>=3.8,<4"],
+    "record": ["mcap>=1.2,<2"],
+    "bench": ["scipy>=1.11,<2"],
+}
+
 
 def tree(folder: str, *patterns: str) -> list[tuple[str, list[str]]]:
     """List the files below `folder` that match, as data_files entries under share/ccr_ros."""
@@ -65,8 +72,9 @@ setup(
         # cyclonedds: each minor release may change the binding that embedded_ros relies on. Asked
         # for where there are wheels (11.0.1); elsewhere embedded_ros has a transport of its own.
         "embedded": [f"cyclonedds>=11.0.1,<11.1; {CYCLONE_WHEELS}", "rosbags>=0.11,<0.12"],
-        "plot": ["matplotlib>=3.8,<4"],
-        "bench": ["scipy>=1.11,<2"],
+        **FEATURES,
+        # All of these features, as ./ccr has them.
+        "all": [requirement for feature in FEATURES.values() for requirement in feature],
         "dev": [
             "pytest>=8,<10",
             "pytest-xdist>=3.5,<4",

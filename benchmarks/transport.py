@@ -19,8 +19,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ccr_ros.demo.environment import DOMAINS, is_free
 from ccr_ros.runtime import real_ros
+from ccr_ros.stack.environment import DOMAINS, is_free
 from embedded_ros.transport.cyclone_config import domain_xml
 
 from .measure import Row

@@ -7,8 +7,8 @@ import random
 import pytest
 from hypothesis import settings
 
-from ccr_ros.demo.environment import DOMAINS, is_free
 from ccr_ros.runtime import enable_ros
+from ccr_ros.stack.environment import DOMAINS, is_free
 
 # The same examples on every machine, however slow it is.
 settings.register_profile("ccr", derandomize=True, deadline=None, max_examples=25)

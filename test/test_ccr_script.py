@@ -129,7 +129,7 @@ def test_first_use_makes_the_environment_and_second_use_does_not(box):
     assert first.stdout == f"ran <solve> <a b> <--pull> <x=4%> in {box.home}\n"  # and nothing else
     assert "making .venv with Python 3.12.3" in first.stderr
     assert "Collecting numpy" in first.stderr
-    assert f"-e {box.root}[embedded,plot,bench,dev]" in box.pip_calls()[0]
+    assert f"-e {box.root}[embedded,all,dev]" in box.pip_calls()[0]
 
     second = box.run("demo")
     assert second.stderr == ""
@@ -240,7 +240,7 @@ def test_where_cyclonedds_has_no_wheel_it_is_said(box, version, machine, system,
     said = box.run("x", PYTHON=str(mine)).stderr
     note = f"note: cyclonedds has no wheel for Python {version} on {system} {machine}; nodes will"
     assert (note in said) is not has_wheel
-    assert f"-e {box.root}[embedded,plot,bench,dev]" in box.pip_calls()[0]  # setup.py has markers
+    assert f"-e {box.root}[embedded,all,dev]" in box.pip_calls()[0]  # setup.py has markers
 
 
 def test_a_failed_installation_leaves_nothing_and_the_next_run_recovers(box):
@@ -333,7 +333,7 @@ def test_with_ros_sourced_its_python_and_numpy_are_kept(box, tmp_path):
     ros = {"PYTHONPATH": str(tmp_path / "ros"), "ROS_DISTRO": "jazzy", "FAKE_RCLPY": "0"}
     assert "making .venv-ros-jazzy" in box.run("x", **ros).stderr
     assert not box.venv.exists()
-    assert "[plot,bench,dev]" in box.pip_calls()[0]  # and so without cyclonedds
+    assert "[all,dev]" in box.pip_calls()[0]  # and so without cyclonedds
     assert " -c " in box.pip_calls()[0]
     assert box.run("x", **ros).stderr == ""
     assert "making .venv with" in box.run("x").stderr  # without ROS, beside it

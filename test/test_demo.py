@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from ccr_ros.demo import output
-from ccr_ros.demo.environment import free_domain, graph_environment, import_environment
 from ccr_ros.demo.measurements import Measurements
 from ccr_ros.demo.progress import Progress
 from ccr_ros.demo.script import BALL, GRIPPER_FILE, PullScript
 from ccr_ros.model import FingerSolver, InvalidFile, InvalidValue, load_gripper
 from ccr_ros.nodes.conversions import obstacle_from_body
 from ccr_ros.resources import find_config
+from ccr_ros.stack.environment import free_domain, graph_environment, import_environment
 from ccr_ros.viz.figures import MissingMatplotlib
 
 FINGERS = ("finger_1", "finger_2", "finger_3")

@@ -36,14 +36,14 @@ def run(args: argparse.Namespace) -> int:
         InvalidFile, InvalidValue: The folder cannot be written to, or the time is out of range.
     """
     # Here, so that `ccr demo --help` stays quick.
-    from ccr_ros.demo.parts import DemoFailed
     from ccr_ros.demo.progress import Progress
     from ccr_ros.demo.session import run_demo
+    from ccr_ros.stack.parts import StackFailed
 
     progress = Progress(sys.stdout)
     try:
         paths = run_demo(Path(args.out), _number(args.seconds), progress)
-    except DemoFailed as error:
+    except StackFailed as error:
         progress.clear()
         print(f"ccr: error: {error}", file=sys.stderr)
         return 1

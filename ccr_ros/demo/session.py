@@ -5,24 +5,23 @@ from __future__ import annotations
 
 import json
 import os
-import tempfile
 import time
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ccr_ros.model import load_gripper
 from ccr_ros.resources import find_config
 from ccr_ros.runtime import enable_ros
+from ccr_ros.stack.environment import graph_environment
+from ccr_ros.stack.parts import Part, StackFailed, Started, Starter
+from ccr_ros.stack.processes import SignalGuard
+from ccr_ros.stack.starter import starter_of_nodes
 from ccr_ros.viz.figures import force_unit
 from ccr_ros.viz.recording import Recording
 
-from .environment import graph_environment, import_environment
 from .measurements import Report
 from .output import prepare_folder, write_files
-from .parts import DemoFailed, Part, Started, Starter
-from .processes import Children, SignalGuard
 from .progress import Progress
 from .script import GRIPPER_FILE, PullScript
 
@@ -51,7 +50,7 @@ def run_demo(folder: Path, seconds: float, progress: Progress) -> list[Path]:
         progress: Told what happens.
 
     Raises:
-        DemoFailed: A node did not appear, ended or fell silent, or another one is in the way.
+        StackFailed: A node did not appear, ended or fell silent, or another one is in the way.
         InvalidFile: A file cannot be written.
         InvalidValue: The time is out of its range.
         RuntimeMissing: There is no rclpy.
@@ -65,7 +64,7 @@ def run_demo(folder: Path, seconds: float, progress: Progress) -> list[Path]:
         started = time.monotonic()
         with signals.held():
             session = _Session(script, progress, signals)
-            with _starter() as starter:
+            with starter_of_nodes(NAMESPACE) as starter:
                 recording, report = session.run(gripper, embedded, starter)
         unit = force_unit(recording.forces_are)
         progress.say(f"the fingers have moved ({time.monotonic() - started:.1f} s); measured:")
@@ -134,7 +133,7 @@ class _Session:
     ) -> None:
         """Raise if a process takes longer than it should."""
         if rivals := recorder.rivals():
-            raise DemoFailed(
+            raise StackFailed(
                 f"other nodes publish {', '.join(rivals)} in ROS domain "
                 f"{os.environ['ROS_DOMAIN_ID']}; end them, or set ROS_DOMAIN_ID to another"
             )
@@ -186,25 +185,6 @@ def _join(gripper: Any) -> tuple[Recorder, Any, Any]:
 
 def _row(texts: Iterable[str]) -> str:
     return " ".join(texts)
-
-
-@contextmanager
-def _starter() -> Iterator[Starter]:
-    """What starts the nodes as they can reach each other, and ends them with the block."""
-    import rclpy
-
-    if rclpy.get_rmw_implementation_identifier() == "embedded_local":
-        from .threads import Threads
-
-        with Threads(NAMESPACE[1:]) as threads:
-            yield threads
-    else:
-        environ = {**os.environ, **import_environment(os.environ)}
-        with (
-            tempfile.TemporaryDirectory(prefix="ccr_demo_") as logs,
-            Children(Path(logs), environ) as children,
-        ):
-            yield children
 
 
 def _introduction(embedded: bool, solver: Started, puller: Started) -> str:

@@ -8,6 +8,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -21,11 +22,28 @@ _GRACE = 3.0  # s that a program has to end by itself when it is told to
 _PR_SET_PDEATHSIG = 1
 
 
+#: Is given the name of a program and a line that it has written.
+Show = Callable[[str, str], object]
+
+
 class Child(Started):
-    """One running program, in a process group of its own, its output in a file."""
+    """One running program, in a process group of its own, its output in a file.
+
+    Args:
+        name: What it is called.
+        command: Its command line.
+        log: File for its output.
+        env: Its environment.
+        show: Told each line of its output when it comes, from a thread; default: nobody.
+    """
 
     def __init__(
-        self, name: str, command: Sequence[str], log: Path, env: Mapping[str, str]
+        self,
+        name: str,
+        command: Sequence[str],
+        log: Path,
+        env: Mapping[str, str],
+        show: Show | None = None,
     ) -> None:
         self.name = name
         self._log = log
@@ -36,13 +54,24 @@ class Child(Started):
                 command,
                 env=dict(env),
                 stdin=subprocess.DEVNULL,
-                stdout=output,
+                stdout=subprocess.PIPE if show else output,
                 stderr=subprocess.STDOUT,
                 start_new_session=True,
                 preexec_fn=_end_with_parent(),
             )
         self.pid = self._process.pid
         self.where = f"process {self.pid}"
+        self._teller: threading.Thread | None = None
+        if show:
+            self._teller = threading.Thread(target=self._tell, args=(show,), daemon=True)
+            self._teller.start()
+
+    def _tell(self, show: Show) -> None:
+        assert self._process.stdout is not None  # as `show` is given
+        with self._log.open("wb", buffering=0) as log:
+            for line in self._process.stdout:
+                log.write(line)
+                show(self.name, line.decode(errors="replace").rstrip())
 
     @property
     def exit_code(self) -> int | None:
@@ -64,6 +93,8 @@ class Child(Started):
             self._process.wait(timeout=max(0.0, deadline - time.monotonic()))
         except subprocess.TimeoutExpired:
             return
+        if self._teller is not None:  # its last words are still to be told
+            self._teller.join(_GRACE)
 
 
 class Children:
@@ -72,11 +103,13 @@ class Children:
     Args:
         logs: Folder for their output.
         env: Their environment.
+        show: Told what they write, line by line; see `Child`.
     """
 
-    def __init__(self, logs: Path, env: Mapping[str, str]) -> None:
+    def __init__(self, logs: Path, env: Mapping[str, str], show: Show | None = None) -> None:
         self._logs = logs
         self._env = env
+        self._show = show
         self._children: list[Child] = []
 
     def __enter__(self) -> Children:
@@ -106,7 +139,7 @@ class Children:
         # -P: not whatever lies in the current folder.
         command = [sys.executable, "-P", "-m", *part.program, *ros_args]
         log = self._logs / f"{part.name}.log"
-        self._children.append(Child(part.name, command, log, self._env))
+        self._children.append(Child(part.name, command, log, self._env, self._show))
         return self._children[-1]
 
 

@@ -5,9 +5,9 @@ import time
 
 import pytest
 
-from ccr_ros.demo.parts import DemoFailed, Part
-from ccr_ros.demo.threads import Threads
 from ccr_ros.model import UnknownName
+from ccr_ros.stack.parts import Part, StackFailed
+from ccr_ros.stack.threads import Threads
 
 NODE = """
 import rclpy
@@ -69,7 +69,7 @@ def test_a_node_that_ends_leaves_what_it_says(part):
     with Threads("quiet") as threads:
         node = threads.start(make("say"))
         assert (finished(node), node.output) == (0, "first\nlast")
-    assert isinstance(node.ended(), DemoFailed)
+    assert isinstance(node.ended(), StackFailed)
     assert str(node.ended()) == (
         "talker (in this process) ended too early (exit code 0); the last it said:\n"
         "     first\n     last"

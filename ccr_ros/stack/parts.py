@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The nodes that the demo starts, and what is known of one that was started."""
+"""A node to be started, and what is known of one that was."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from ccr_ros.model import CcrError
 _TAIL = 8  # lines of its output that are shown when it fails
 
 
-class DemoFailed(CcrError):
-    """The demo could not be carried through; its text says why."""
+class StackFailed(CcrError):
+    """Nodes started together could not do what they were started for; its text says why."""
 
 
 @dataclass(frozen=True)
@@ -54,9 +54,9 @@ class Started(ABC):
     def output(self) -> str:
         """What it has written so far."""
 
-    def failure(self, what: str) -> DemoFailed:
+    def failure(self, what: str) -> StackFailed:
         """Return an error that says what went wrong with it, with the end of its output."""
-        return DemoFailed(f"{self.name} {what}; {self.last_words()}")
+        return StackFailed(f"{self.name} {what}; {self.last_words()}")
 
     def last_words(self) -> str:
         """Return the last lines of its output, introduced and indented."""
@@ -64,7 +64,7 @@ class Started(ABC):
         said = "\n".join(f"     {line}" for line in lines) or "     (nothing)"
         return f"the last it said:\n{said}"
 
-    def ended(self) -> DemoFailed:
+    def ended(self) -> StackFailed:
         """Return an error that says that, and how, it ended."""
         code = self.exit_code
         how = f"exit code {code}"

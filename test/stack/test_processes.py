@@ -7,9 +7,9 @@ import time
 
 import pytest
 
-from ccr_ros.demo.environment import import_environment
-from ccr_ros.demo.parts import DemoFailed, Part
-from ccr_ros.demo.processes import Children, SignalGuard
+from ccr_ros.stack.environment import import_environment
+from ccr_ros.stack.parts import Part, StackFailed
+from ccr_ros.stack.processes import Children, SignalGuard
 
 
 @pytest.fixture
@@ -39,7 +39,7 @@ def wait_for_output(child, text):
 
 
 def test_children_end_with_the_block_even_if_they_refuse(module, tmp_path, monkeypatch):
-    monkeypatch.setattr("ccr_ros.demo.processes._GRACE", 0.3)
+    monkeypatch.setattr("ccr_ros.stack.processes._GRACE", 0.3)
     write, env = module
     stubborn = write(
         "import signal, time\n"
@@ -61,7 +61,7 @@ def test_an_ended_child_tells_how_and_what_it_said(module, tmp_path):
         child = children.start(Part("talker", (program,), ""))
         child.wait(time.monotonic() + 20)
         error = child.ended()
-    assert isinstance(error, DemoFailed)
+    assert isinstance(error, StackFailed)
     assert "talker (process" in str(error) and "exit code 1" in str(error)
     assert str(error).endswith("     early\n     too bad") or str(error).endswith(
         "     too bad\n     early"
@@ -84,8 +84,8 @@ def test_children_end_if_their_parent_is_killed(module, tmp_path):
     name = write("import time; print('ready', flush=True); time.sleep(60)")
     parent = (
         "import os, sys, time, pathlib\n"
-        "from ccr_ros.demo.parts import Part\n"
-        "from ccr_ros.demo.processes import Children\n"
+        "from ccr_ros.stack.parts import Part\n"
+        "from ccr_ros.stack.processes import Children\n"
         f"children = Children(pathlib.Path({str(tmp_path)!r}), os.environ)\n"
         f"child = children.start(Part('sleeper', ({name!r},), ''))\n"
         "while 'ready' not in child.output: time.sleep(0.02)\n"
