@@ -26,3 +26,6 @@ COMMAND_QUEUE = reliable(depth=256)
 LATCHED = reliable(depth=1, latched=True)
 
 DIAGNOSTICS = reliable(depth=10)
+
+# joint_states: reliable, so that listeners of either kind hear it.
+JOINT_STATES = reliable(depth=10)
