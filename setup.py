@@ -66,6 +66,7 @@ setup(
         "numpy>=1.26,<3",
         "casadi>=3.7,<4",
         "PyYAML>=6.0,<7",
+        "transitions>=0.9,<0.10",  # the state machine of grasp/
     ],
     extras_require={
         # The rclpy of machines without ROS 2 (see embedded_ros); never needed under ROS 2.
