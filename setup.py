@@ -81,6 +81,7 @@ setup(
             "pytest-xdist>=3.5,<4",
             "pytest-timeout>=2.2,<3",
             "hypothesis>=6.98,<7",
+            "mcap-ros2-support>=0.5,<1",
             "ruff>=0.15,<0.18",
             "mypy>=1.15,<3",
             "types-PyYAML>=6.0",

@@ -30,6 +30,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     ),
     "bench": ("ccr_ros.cli.bench", "measure speed and accuracy next to other solvers"),
     "run": ("ccr_ros.cli.run", "run a node"),
+    "up": ("ccr_ros.cli.up", "run all nodes of a gripper in one terminal"),
     "topic": ("ccr_ros.cli.ros.topic", "list, echo, publish and measure topics"),
     "node": ("ccr_ros.cli.ros.node", "list nodes, and tell what one has"),
     "service": ("ccr_ros.cli.ros.service", "list and call services"),
