@@ -3,13 +3,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from . import checks
-from .errors import InvalidFile, InvalidValue, MissingKey, UnknownKey
+from .errors import InvalidFile, InvalidValue
+from .file_checks import located, mapping, sequence
 from .finger import MAX_SEGMENTS, Cable, Finger
 from .obstacles import Box, Cylinder, Obstacle, Plane, Sphere
 from .rotation import Pose
@@ -78,15 +79,15 @@ def load_gripper(path: str | Path) -> Gripper:
     if "cables" in data and "fingers" not in data:
         raise InvalidFile(path, "describes a finger (it has 'cables'); a gripper file is wanted")
     try:
-        data = _mapping(data, {"name", "fingers"}, set())
+        data = mapping(data, {"name", "fingers"}, set())
         name = checks.name("name", data["name"])
-        entries = _list("fingers", data["fingers"])
+        entries = sequence("fingers", data["fingers"])
         if not entries:
             raise InvalidValue("fingers", entries, "a list of at least one finger")
         fingers: list[MountedFinger] = []
         for i, entry in enumerate(entries):
             place = f"fingers[{i}]"
-            fingers.append(_located(place, _mounted, entry, Path(path), place))
+            fingers.append(located(place, _mounted, entry, Path(path), place))
             names = [f.finger.name for f in fingers]
             if names.count(names[-1]) > 1:
                 raise InvalidValue(f"{place}.name", names[-1], "unique in its gripper")
@@ -102,14 +103,14 @@ def finger_from_dict(data: Any, source: str | None = None) -> Finger:
         InvalidValue: As for `load_finger`; its ``source`` is the given one.
     """
     try:
-        values = _mapping(data, _FINGER_NEEDS, _FINGER_KEYS - _FINGER_NEEDS)
+        values = mapping(data, _FINGER_NEEDS, _FINGER_KEYS - _FINGER_NEEDS)
         holes_per_disk = checks.integer(
             "holes_per_disk", values.get("holes_per_disk", 12), low=1, high=3600
         )
         disks = checks.integer("segments", values["segments"], low=2, high=MAX_SEGMENTS) + 1
         values["cables"] = [
-            _located(f"cables[{i}]", _cable, c, holes_per_disk, disks)
-            for i, c in enumerate(_list("cables", values["cables"]))
+            located(f"cables[{i}]", _cable, c, holes_per_disk, disks)
+            for i, c in enumerate(sequence("cables", values["cables"]))
         ]
         values["obstacles"] = obstacles_from_list(values.get("obstacles", []), "obstacles")
         return Finger(**values)
@@ -120,8 +121,8 @@ def finger_from_dict(data: Any, source: str | None = None) -> Finger:
 def obstacles_from_list(entries: Any, place: str = "obstacles") -> tuple[Obstacle, ...]:
     """Make obstacles from a list of mappings with a ``type`` key (and an optional ``name``)."""
     obstacles: list[Obstacle] = []
-    for i, entry in enumerate(_list(place, entries)):
-        obstacle = _located(f"{place}[{i}]", _obstacle, entry, i)
+    for i, entry in enumerate(sequence(place, entries)):
+        obstacle = located(f"{place}[{i}]", _obstacle, entry, i)
         if obstacle.name in {o.name for o in obstacles}:
             raise InvalidValue(f"{place}[{i}].name", obstacle.name, "unique among the obstacles")
         obstacles.append(obstacle)
@@ -129,16 +130,16 @@ def obstacles_from_list(entries: Any, place: str = "obstacles") -> tuple[Obstacl
 
 
 def _mounted(entry: Any, gripper_file: Path, place: str) -> MountedFinger:
-    entry = _mapping(entry, {"name", "base"}, {"file", "finger"})
+    entry = mapping(entry, {"name", "base"}, {"file", "finger"})
     name = checks.name("name", entry["name"])
     if ("file" in entry) == ("finger" in entry):
         raise InvalidValue("", sorted(entry), "a mapping with exactly one of 'file' and 'finger'")
-    base = _located("base", _base, entry["base"])
+    base = located("base", _base, entry["base"])
     if "finger" in entry:
         inline = entry["finger"]
         if isinstance(inline, Mapping):  # else the error says so
             inline = {**inline, "name": name}
-        return MountedFinger(_located("finger", finger_from_dict, inline), base)
+        return MountedFinger(located("finger", finger_from_dict, inline), base)
     if not isinstance(entry["file"], str):
         raise InvalidValue("file", entry["file"], "a path relative to the gripper file")
     file = gripper_file.parent / entry["file"]
@@ -151,11 +152,11 @@ def _mounted(entry: Any, gripper_file: Path, place: str) -> MountedFinger:
 
 
 def _base(entry: Any) -> Pose:
-    return Pose(**_mapping(entry, {"position"}, {"orientation"}))
+    return Pose(**mapping(entry, {"position"}, {"orientation"}))
 
 
 def _cable(entry: Any, holes_per_disk: int, disks: int) -> Cable:
-    entry = _mapping(entry, {"name"}, {"holes", "angles", "last_disk"})
+    entry = mapping(entry, {"name"}, {"holes", "angles", "last_disk"})
     if ("holes" in entry) == ("angles" in entry):
         raise InvalidValue("", sorted(entry), "a mapping with exactly one of 'holes' and 'angles'")
     key = "holes" if "holes" in entry else "angles"
@@ -176,47 +177,11 @@ def _cable(entry: Any, holes_per_disk: int, disks: int) -> Cable:
 
 
 def _obstacle(entry: Any, index: int) -> Obstacle:
-    kind = _mapping(entry, {"type"}, None)["type"]
+    kind = mapping(entry, {"type"}, None)["type"]
     if not isinstance(kind, str) or kind not in _OBSTACLES:
         raise InvalidValue("type", kind, f"one of {', '.join(_OBSTACLES)}")
     cls, needs, may = _OBSTACLES[kind]
-    values = _mapping(entry, needs | {"type"}, may | {"name"})
+    values = mapping(entry, needs | {"type"}, may | {"name"})
     del values["type"]
     values["name"] = checks.label("name", values.get("name", f"{kind}_{index}"))
     return cls(**values)
-
-
-def _located(place: str, make: Callable[..., Any], *args: Any) -> Any:
-    """Return make(*args); an error in it that has no file yet is nested under ``place``."""
-    try:
-        return make(*args)
-    except InvalidValue as error:
-        raise error if error.source else error.located(place) from None
-
-
-def _list(place: str, value: Any) -> list[Any]:
-    if not isinstance(value, list | tuple):
-        raise InvalidValue(place, value, "a list")
-    return list(value)
-
-
-def _mapping(data: Any, needs: set[str], may: set[str] | None) -> dict[str, Any]:
-    """Return the keys with a value: all needed and, unless ``may`` is None, no unknown ones."""
-    if not isinstance(data, Mapping):
-        raise InvalidValue("", data, "a mapping ('key: value')")
-    if may is not None:
-        valid = sorted(needs | may)
-        for key in data:
-            if key not in valid:
-                raise UnknownKey(_key_text(key), data[key], ", ".join(valid))
-    given = {key: value for key, value in data.items() if value is not None}
-    for key in sorted(needs):
-        if key not in given:
-            raise MissingKey(key, None, "given: this key is required")
-    return given
-
-
-def _key_text(key: Any) -> str:
-    """Return a key as it may stand in a one-line message."""
-    plain = isinstance(key, str) and key.isprintable() and 0 < len(key) <= 60
-    return key if plain else repr(key)[:60]
