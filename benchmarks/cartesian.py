@@ -223,6 +223,8 @@ class CartesianProblem:
 
     def _rest_unknowns(self) -> np.ndarray:
         """The rest shape: constant-curvature segments, holes perpendicular to the tangents used."""
+        if self.finger.rest_varies:
+            raise ValueError("the baseline takes a rest curvature that is constant per segment")
         pose, centres, holes = np.eye(4), [np.zeros(3)], [np.zeros(3)]
         rest_curvature = np.asarray(self.finger.rest_curvature)
         for curvature, angle in zip(rest_curvature, self._angles[1:], strict=True):

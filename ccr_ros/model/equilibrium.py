@@ -13,10 +13,12 @@ the problem and evaluates it with exact derivatives; `solver` solves it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .errors import InvalidValue
 from .finger import Finger
 from .obstacles import Obstacle
 from .rod import Rod, RodState
@@ -123,26 +125,43 @@ class Linearization:
     lengths: np.ndarray
 
 
+def rest_coordinates(finger: Finger, arcs_per_segment: int, order: int) -> np.ndarray:
+    """Return the arc coordinates (E, 3 (order + 1)) of the rest shape.
+
+    A part of a piece of linear curvature has linear curvature again; without a linear part
+    (order 0) an arc gets its mean curvature.
+
+    Args:
+        finger: Its rest shape is meant.
+        arcs_per_segment: A multiple of `Finger.rest_pieces`.
+        order: Of the arcs' curvature.
+    """
+    knots = finger.rest_curvature_knots
+    k = arcs_per_segment // finger.rest_pieces
+    part = np.arange(k + 1)[:, None] / k
+    ends = knots[:, :-1, None] + part * (knots[:, 1:, None] - knots[:, :-1, None])  # (n, ., k+1, 3)
+    turns = ends * (finger.segment_length / arcs_per_segment)
+    mean, half = (turns[:, :, 1:] + turns[:, :, :-1]) / 2, (turns[:, :, 1:] - turns[:, :, :-1]) / 2
+    return np.concatenate([mean, half][: order + 1], axis=3).reshape(-1, 3 * (order + 1))
+
+
 class EquilibriumProblem:
     """The optimisation problem of one finger, built once and evaluated often."""
 
     def __init__(self, finger: Finger, settings: SolverSettings | None = None) -> None:
         self.finger = finger
         self.settings = settings or SolverSettings()
-        k, order = self.settings.arcs_per_segment, self.settings.order(finger.segments)
+        k = self.arcs_per_segment = self.settings.arcs_per_segment * finger.rest_pieces
+        order = self.settings.order(finger)
         self.arcs = finger.segments * k
         self.rod = Rod(self.arcs, order)
         h = 1.0 / self.arcs
         stiffness = np.array([1.0, 1.0, finger.torsion_ratio])
         # 1/2 h k (a - rest)^2 + 1/2 (h k / 3) b^2: Legendre polynomials are orthogonal.
         per_arc = np.concatenate([stiffness, stiffness / 3][: order + 1])
-        rest = np.zeros((self.arcs, self.rod.size))
-        turns = np.asarray(finger.rest_curvature) * finger.length * h
-        rest[:, :3] = np.repeat(turns, k, axis=0)
-        self._z_rest = rest
         self.coordinate_scale = np.sqrt(h / per_arc)  # z = rest + scale * y
         self.rod_step = h
-        self.size = rest.size
+        self.size = self.arcs * self.rod.size
 
         self.points = Points(finger)
         spans = [
@@ -181,11 +200,38 @@ class EquilibriumProblem:
             [int(np.argmax(self.group_cable == j)) for j in range(len(finger.cables))]
         )
         self.obstacles: tuple[Obstacle, ...] = finger.obstacles
+        self._start_from(finger)
+
+    def _start_from(self, finger: Finger) -> None:
+        """Take the rest shape of ``finger``, from which y and the pulls count."""
+        self.finger = finger
+        self.z_rest = rest_coordinates(finger, self.arcs_per_segment, self.rod.order)
         self.rest = self.evaluate(np.zeros(self.size))
         self.rest_lengths = np.bincount(
             self.group_cable, self.rest.lengths, minlength=len(finger.cables)
         )
         self._shares = self.rest.lengths / self.rest_lengths[self.group_cable] / finger.length
+
+    def with_rest_curvature(self, rest_curvature: np.ndarray) -> EquilibriumProblem:
+        """Return this problem with another rest shape; see `Finger.rest_curvature`.
+
+        All that does not depend on the rest shape is shared, so it costs little; not for use by
+        several threads at once.
+
+        Raises:
+            InvalidValue: A curvature that no finger can have at rest, or one that is linear along
+                more pieces of a segment than the problem's arcs can follow.
+        """
+        other = copy(self)
+        finger = replace(self.finger, rest_curvature=rest_curvature)
+        if self.arcs_per_segment % finger.rest_pieces:
+            raise InvalidValue(
+                "rest_curvature",
+                rest_curvature,
+                f"linear along pieces that {self.arcs_per_segment} arcs per segment can follow",
+            )
+        other._start_from(finger)
+        return other
 
     # -- constraint bounds -----------------------------------------------------------------
 
@@ -197,7 +243,7 @@ class EquilibriumProblem:
 
     def evaluate(self, y: np.ndarray) -> Evaluation:
         """Evaluate pose and constraints at y (N,)."""
-        z = self._z_rest + self.coordinate_scale * y.reshape(self.arcs, -1)
+        z = self.z_rest + self.coordinate_scale * y.reshape(self.arcs, -1)
         rod = self.rod.state(z)
         # A disk's points lie in its x-y plane.
         frames, offset = rod.rotations[self._point_arc], self.points.offset

@@ -15,6 +15,7 @@ from .errors import InvalidValue, UnknownName
 from .obstacles import Obstacle
 
 MAX_SEGMENTS = 1000
+MAX_PIECES = 8  # of a segment, along which the rest curvature is linear
 _TINY, _HUGE = 1e-6, 1e3  # m; between these a length is believed
 
 
@@ -70,7 +71,9 @@ class Finger:
         poisson_ratio: nu of the backbone; GJ / EI = 1 / (1 + nu).
         cables: The cables, in the order in which pulls are given.
         youngs_modulus: E [Pa], or ``None``: forces are then per EI.
-        rest_curvature: (n, 3) curvature [1/m] of each segment at rest, in the segment's own frame.
+        rest_curvature: (n, 3) curvature [1/m] of each segment at rest, in the frame that is carried
+            along it; or (n, k + 1, 3): at the ends of k equal pieces of each segment, linear
+            between.
         holes_per_disk: Number of clock holes on a disk.
         obstacles: What the finger may touch, in the frame of its base.
     """
@@ -125,25 +128,31 @@ class Finger:
         else:
             allowed = f"{n} vectors of 3 numbers [1/m], one per segment"
             if not checks.is_list(value):
-                raise InvalidValue("rest_curvature", value, allowed)
+                raise InvalidValue("rest_curvature", value, f"{allowed}, or {n} lists of vectors")
             if len(value) != n:
                 raise InvalidValue("rest_curvature", value, f"{allowed} (got {len(value)})")
-            rest = np.array(
-                [
-                    checks.vector(f"rest_curvature[{i}]", v, 3, unit="1/m")
-                    for i, v in enumerate(value)
-                ]
-            )
+            if checks.is_list(value[0]) and len(value[0]) and checks.is_list(value[0][0]):
+                knots = len(value[0])
+                rest = np.array(
+                    [_curvatures(f"rest_curvature[{i}]", v, knots) for i, v in enumerate(value)]
+                )
+            else:
+                rest = np.array(
+                    [
+                        checks.vector(f"rest_curvature[{i}]", v, 3, unit="1/m")
+                        for i, v in enumerate(value)
+                    ]
+                )
         # A segment bent further than half a turn, or so tightly that the inner side of a disk
         # folds onto the next, is no finger.
-        limit = min(1.0 / self.disk_radius, math.pi / self.segment_length)
-        for i, u in enumerate(rest):
-            bend = math.hypot(u[0], u[1])
-            if bend >= limit or abs(u[2]) >= math.pi / self.segment_length:
+        limit, twist = self.largest_rest_curvature
+        for index in np.ndindex(rest.shape[:-1]):
+            u = rest[index]
+            if math.hypot(u[0], u[1]) >= limit or abs(u[2]) >= twist:
                 raise InvalidValue(
-                    f"rest_curvature[{i}]",
+                    "rest_curvature" + "".join(f"[{i}]" for i in index),
                     [float(x) for x in u],
-                    f"bending < {limit:.6g} 1/m and twist < {math.pi / self.segment_length:.6g} 1/m"
+                    f"bending < {limit:.6g} 1/m and twist < {twist:.6g} 1/m"
                     " (disks would meet, or a segment turn by more than half a turn)",
                 )
         rest.setflags(write=False)
@@ -203,6 +212,28 @@ class Finger:
         return self.length / self.segments
 
     @property
+    def largest_rest_curvature(self) -> tuple[float, float]:
+        """Bending and twist [1/m] that the rest curvature stays below, anywhere."""
+        half_turn = math.pi / self.segment_length
+        return min(1.0 / self.disk_radius, half_turn), half_turn
+
+    @property
+    def rest_varies(self) -> bool:
+        """Whether the rest curvature is given at several places of each segment."""
+        return np.asarray(self.rest_curvature).ndim == 3
+
+    @property
+    def rest_pieces(self) -> int:
+        """Number k of pieces of a segment along which the rest curvature is linear."""
+        return np.asarray(self.rest_curvature).shape[1] - 1 if self.rest_varies else 1
+
+    @property
+    def rest_curvature_knots(self) -> np.ndarray:
+        """Rest curvature (n, k + 1, 3) [1/m] at the ends of each segment's pieces."""
+        rest = np.asarray(self.rest_curvature)
+        return rest if self.rest_varies else np.repeat(rest[:, None, :], 2, axis=1)
+
+    @property
     def second_moment(self) -> float:
         """Second moment of area I = pi d^4 / 64 of the backbone [m^4]."""
         return math.pi * self.backbone_diameter**4 / 64
@@ -257,3 +288,17 @@ class Finger:
                 for c, v in zip(self.cable_names, values, strict=True)
             ]
         )
+
+
+def _curvatures(place: str, value: Any, knots: int) -> np.ndarray:
+    """Return the curvature (knots, 3) at the ends of a segment's pieces."""
+    count = len(value) if checks.is_list(value) else 0
+    if count != knots or not 2 <= count <= MAX_PIECES + 1:
+        number = f"{knots}" if count and 2 <= knots <= MAX_PIECES + 1 else f"2..{MAX_PIECES + 1}"
+        raise InvalidValue(
+            place,
+            value,
+            f"{number} vectors of 3 numbers [1/m], from its start to its end,"
+            " as many for each segment",
+        )
+    return np.array([checks.vector(f"{place}[{i}]", v, 3, unit="1/m") for i, v in enumerate(value)])

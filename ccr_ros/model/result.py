@@ -77,10 +77,10 @@ def make_solution(
     point = walk.point
     finger, at, length = problem.finger, point.at, problem.finger.length
     force_unit = finger.bending_stiffness / length**2
-    disks = np.arange(finger.segments + 1) * problem.settings.arcs_per_segment
+    disks = np.arange(finger.segments + 1) * problem.arcs_per_segment
     eigenvalue = _smallest_eigenvalue(point)
     z = at.z / problem.rod_step
-    arcs = (finger.segments, problem.settings.arcs_per_segment, problem.rod.order + 1, 3)
+    arcs = (finger.segments, problem.arcs_per_segment, problem.rod.order + 1, 3)
     metres = at.points * length
     names = finger.cable_names
     cable_error, penetration = _errors(problem, point, walk.pulls)
@@ -149,7 +149,7 @@ def _contacts(problem: EquilibriumProblem, point: KktPoint, unit: float) -> tupl
 def meeting_disks(problem: EquilibriumProblem, point: KktPoint) -> tuple[int, int] | None:
     """The first two neighbouring disks that cut each other, or None; disks are taken as thin."""
     centres = point.at.points[problem.points.backbone]
-    step = problem.settings.arcs_per_segment
+    step = problem.arcs_per_segment
     axes = point.at.rod.rotations[::step, :, 2]
     between = centres[1:] - centres[:-1]
     cosine = np.einsum("ij,ij->i", axes[1:], axes[:-1])

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from . import checks
 from .errors import InvalidValue
+from .finger import Finger
 
 _FINE = 24  # segments; there one constant arc each is off by less than 0.04 % of the length
 
@@ -16,10 +17,12 @@ class SolverSettings:
     """How the equilibrium is discretised and solved.
 
     Attributes:
-        arcs_per_segment: Number of arcs a segment is made of.
+        arcs_per_segment: Number of arcs a segment is made of; of each piece of a segment, where
+            the rest curvature is linear along several pieces.
         curvature_order: 1: curvature linear along each arc, as close to the rod as four arcs of
             constant curvature; 0: constant-curvature arcs; ``None`` (default): 1 for fingers of
-            fewer than 24 segments, 0 where segments are so short that it makes no difference.
+            fewer than 24 segments, or whose rest curvature varies along segments;
+            0 where segments are so short that it makes no difference.
         cable_model: ``"frictionless"``: a cable's total length is bounded, its tension uniform;
             ``"proportional"``: each span's length is bounded, as in the paper's section 2.2.2.
         max_pull_step: Largest pull change of one continuation step, as a fraction of the finger's
@@ -50,8 +53,11 @@ class SolverSettings:
         checks.real("tolerance", self.tolerance, above=0, high=1e-3)
         checks.real("time_limit", self.time_limit, above=0, unit="s")
 
-    def order(self, segments: int) -> int:
-        """Return the curvature order used for a finger of this many segments."""
+    def order(self, finger: Finger) -> int:
+        """Return the curvature order used for a finger.
+
+        One whose rest curvature varies along its segments is not held to constant arcs.
+        """
         if self.curvature_order is not None:
             return self.curvature_order
-        return 1 if segments < _FINE else 0
+        return 1 if finger.segments < _FINE or finger.rest_varies else 0

@@ -278,10 +278,33 @@ def test_a_cable_may_end_before_the_tip():
         ([[0, 0, 0], [0, 200, 0]], "rest_curvature[1]"),
         ([[0, 0, 100], [0, 0, 0]], "rest_curvature[0]"),
         ([[1e200, 1e200, 0], [0, 0, 0]], "rest_curvature[0]"),
+        ([[[0, 0, 0], [0, 1, 0]], [0, 0, 0]], "rest_curvature[1]"),
+        ([[0, 0, 0], [[0, 0, 0], [0, 1, 0]]], "rest_curvature[1]"),
+        ([[[0, 0, 0]] * 2, [[0, 0, 0]] * 3], "rest_curvature[1]"),
+        ([[[0, 0, 0]]] * 2, "rest_curvature[0]"),
+        ([[[0, 0, 0]] * 10] * 2, "rest_curvature[0]"),
+        ([[[0, 0, 0]] * 2, [[0, 0, 0], 0]], "rest_curvature[1][1]"),
+        ([[[0, 0, 0]] * 2, [[0, 0, 0], [0, 0]]], "rest_curvature[1][1]"),
+        ([[[0, 0, 0], [0, math.inf, 0]]] * 2, "rest_curvature[0][1][1]"),
+        ([[[0, 0, 0], [0, 200, 0]], [[0, 0, 0]] * 2], "rest_curvature[0][1]"),
+        ([[[[0]], [0, 1, 0]]] * 2, "rest_curvature[0][0]"),
+        ([[]] * 2, "rest_curvature[0]"),
+        ([[[]]] * 2, "rest_curvature[0]"),
     ],
 )
 def test_bad_rest_curvature(value, place):
     assert refused(changed(rest_curvature=value)).place == place
+
+
+def test_rest_curvature_at_several_places_of_segments():
+    pairs = [[[0, 1.5, 0], [0, 2, 0]], [[0, 2, 0], [-1, 0, 2]]]
+    for knots in (pairs, [[*pair, [0, 0, 0]] for pair in pairs]):
+        finger = finger_from_dict(changed(rest_curvature=knots))
+        assert finger.rest_curvature.tolist() == finger.rest_curvature_knots.tolist() == knots
+    error = refused(changed(rest_curvature=[pairs[0], [[0, 0, 0]] * 3]))
+    assert "2 vectors of 3 numbers [1/m], from its start to its end" in error.allowed
+    error = refused(changed(rest_curvature=[[[0, 0, 0]], [[0, 0, 0]]]))
+    assert "2..9 vectors" in error.allowed
 
 
 SPHERE = {"type": "sphere", "center": [0, 0, 1], "radius": 0.1}

@@ -94,6 +94,20 @@ def test_a_finger_does_not_change():
     assert dataclasses.replace(finger, length=0.2).rest_curvature.tolist() == [[1, 1, 1]] * 9
 
 
+def test_rest_curvature_at_several_places_of_segments():
+    constant = np.random.default_rng(1).normal(size=(9, 3))
+    finger = make_finger(rest_curvature=constant)
+    assert not finger.rest_varies and finger.rest_pieces == 1 and not make_finger().rest_varies
+    assert np.array_equal(finger.rest_curvature_knots, np.stack([constant, constant], axis=1))
+    for pieces in (1, 2, 8):
+        knots = np.stack([k * constant for k in range(pieces + 1)], axis=1)
+        finger = make_finger(rest_curvature=knots)
+        assert finger.rest_varies and finger.rest_pieces == pieces
+        assert np.array_equal(finger.rest_curvature_knots, knots)
+    with pytest.raises(ValueError, match="read-only"):
+        finger.rest_curvature_knots[0, 0, 0] = 2
+
+
 def test_numpy_numbers_become_plain_ones():
     finger = make_finger(length=np.float32(0.25), segments=np.int32(9))
     assert type(finger.length) is float and type(finger.segments) is int
@@ -125,6 +139,8 @@ def test_numpy_numbers_become_plain_ones():
         ({"rest_curvature": np.zeros((8, 3))}, "rest_curvature"),
         ({"rest_curvature": np.zeros(27)}, "rest_curvature"),
         ({"rest_curvature": np.array(0.0)}, "rest_curvature"),
+        ({"rest_curvature": np.zeros((9, 10, 3))}, "rest_curvature[0]"),
+        ({"rest_curvature": np.full((9, 2, 3), 125.0)}, "rest_curvature[0][0]"),
         ({"rest_curvature": np.full((9, 3), np.inf)}, "rest_curvature[0][0]"),
     ],
 )
