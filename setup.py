@@ -26,6 +26,7 @@ CYCLONE_WHEELS = (
 FEATURES = {
     "plot": ["matplotlib>=3.8,<4"],
     "record": ["mcap>=1.2,<2"],
+    "design": ["scipy>=1.11,<2", "manifold3d>=3.1,<4"],  # curves through points; solids to print
     "bench": ["scipy>=1.11,<2"],
 }
 

@@ -7,7 +7,8 @@ CcrError
 │   └── UnknownKey    a key that is not among the valid ones
 ├── InvalidFile       a file that cannot be read or parsed at all
 ├── UnknownName       a name that is not among the valid ones
-└── NotConverged      a pose was demanded of a solve that did not converge
+├── NotConverged      a pose was demanded of a solve that did not converge
+└── MissingPackage    an optional dependency is needed and not installed
 """
 
 from __future__ import annotations
@@ -112,6 +113,23 @@ class NotConverged(CcrError):
         self.finger = finger
         self.reason = reason
         super().__init__(f"finger {finger!r}: no converged pose: {reason}")
+
+
+class MissingPackage(CcrError):
+    """Something needs an optional dependency that is not installed.
+
+    Attributes:
+        package: The package, as pip names it.
+        extra: The extra of this package that brings it.
+    """
+
+    def __init__(self, what: str, package: str, extra: str) -> None:
+        self.package = package
+        self.extra = extra
+        super().__init__(
+            f"{what} needs {package}, which is not installed: install it (pip install {package},"
+            f" or this package with its extra {extra!r})"
+        )
 
 
 def _restored(cls: type[CcrError], args: tuple[Any, ...], state: dict[str, Any]) -> CcrError:

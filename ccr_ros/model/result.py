@@ -151,15 +151,24 @@ def meeting_disks(problem: EquilibriumProblem, point: KktPoint) -> tuple[int, in
     centres = point.at.points[problem.points.backbone]
     step = problem.arcs_per_segment
     axes = point.at.rod.rotations[::step, :, 2]
+    overlap = disk_overlap(centres, axes, problem.finger.disk_radius / problem.finger.length)
+    cut = np.flatnonzero(overlap > 0)
+    return (int(cut[0]), int(cut[0]) + 1) if len(cut) else None
+
+
+def disk_overlap(centres: np.ndarray, axes: np.ndarray, radius: float) -> np.ndarray:
+    """How far (n,) neighbouring disks reach into each other; negative: the gap between them.
+
+    Disks are taken as thin; centres (n+1, 3) and radius in one unit, which is the result's.
+    """
     between = centres[1:] - centres[:-1]
     cosine = np.einsum("ij,ij->i", axes[1:], axes[:-1])
     # How far the rim of either disk dips below the other's centre plane.
-    dip = problem.finger.disk_radius / problem.finger.length * np.sqrt(np.maximum(1 - cosine**2, 0))
+    dip = radius * np.sqrt(np.maximum(1 - cosine**2, 0))
     lift = np.minimum(
         np.einsum("ij,ij->i", between, axes[:-1]), np.einsum("ij,ij->i", between, axes[1:])
     )
-    cut = np.flatnonzero(lift < dip)
-    return (int(cut[0]), int(cut[0]) + 1) if len(cut) else None
+    return dip - lift
 
 
 def _message(problem: EquilibriumProblem, walk: Walk, stable: bool) -> str:

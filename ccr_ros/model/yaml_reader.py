@@ -22,7 +22,7 @@ def read_mapping(path: str | Path) -> dict[Any, Any]:
     Raises:
         InvalidFile: The file cannot be read, is not YAML, or does not hold a mapping.
     """
-    data = _parse(path, _text(path))
+    data = _parse(path, read_text(path, _LARGEST))
     if data is None:
         raise InvalidFile(path, "is empty; a mapping ('name: ...', one key per line) is wanted")
     if not isinstance(data, Mapping):
@@ -33,16 +33,21 @@ def read_mapping(path: str | Path) -> dict[Any, Any]:
     return dict(data)
 
 
-def _text(path: str | Path) -> str:
+def read_text(path: str | Path, largest: int) -> str:
+    """Return the text of a UTF-8 file of at most ``largest`` bytes.
+
+    Raises:
+        InvalidFile: It cannot be read, is larger, or is not UTF-8 text.
+    """
     try:
         with Path(path).open("rb") as file:
-            data = file.read(_LARGEST + 1)
+            data = file.read(largest + 1)
     except OSError as error:
         raise InvalidFile(path, f"cannot be read: {error.strerror}") from None
     except ValueError as error:  # a null byte in the path
         raise InvalidFile(path, f"cannot be read: {error}") from None
-    if len(data) > _LARGEST:
-        raise InvalidFile(path, f"cannot be read: larger than {_LARGEST / 1e6:g} MB")
+    if len(data) > largest:
+        raise InvalidFile(path, f"cannot be read: larger than {largest / 1e6:g} MB")
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -1,0 +1,302 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Wanted curves that leave the base upwards and then follow the contour of an object.
+
+All lies in the plane of z and the direction in which the object stands. There the object's section
+is a rectangle with rounded corners (`Section`; a circle has no straight sides), and so is what the
+backbone follows, the section grown by the disks' radius and a clearance. The way to it, the
+lead-in, has a curvature that is a cubic of the arc length: 0 at the base, the contour's own where
+it joins it, so that nothing jumps there. Of all joins the one is taken whose lead-in bends least.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial import Polynomial
+
+from ..model import checks
+from ..model.errors import InvalidValue
+from .curves import PlanarCurve
+
+_NODES, _WEIGHTS = (x / 2 for x in np.polynomial.legendre.leggauss(24))
+_NODES = _NODES + 0.5
+_TOLERANCE = 1e-12  # relative to the way from the base to the join
+_INSIDE = 1e-6  # m; so deep a lead-in may pass through the contour at the points looked at
+_LOOKS = 65
+_STEEPEST = math.radians(80.0)  # heading at which a lead-in may join
+_JOINS = 49  # that are tried
+_REFINEMENTS = 16
+
+
+@dataclass(frozen=True)
+class Section:
+    """An object's section in the finger's plane: a rectangle with rounded corners, or a circle.
+
+    Attributes:
+        half_width: Half of its extent across z, away from the base [m].
+        half_height: Half of its extent along z [m].
+        corner_radius: [m]; a circle's is its radius, and half of both extents.
+        forward: How far its centre is in front of the base [m].
+        up: How far its centre is above the base [m].
+
+    Raises:
+        InvalidValue: A value out of its range.
+    """
+
+    half_width: float
+    half_height: float
+    corner_radius: float
+    forward: float
+    up: float
+
+    def __post_init__(self) -> None:
+        width = checks.real("half_width", self.half_width, above=0, high=1e3, unit="m")
+        height = checks.real("half_height", self.half_height, above=0, high=1e3, unit="m")
+        largest = min(width, height) * (1 + 1e-12)
+        checks.real("corner_radius", self.corner_radius, low=0, high=largest, unit="m")
+        checks.real("forward", self.forward, low=-1e3, high=1e3, unit="m")
+        checks.real("up", self.up, low=-1e3, high=1e3, unit="m")
+
+    @classmethod
+    def circle(cls, radius: float, forward: float, up: float) -> Section:
+        """Return the section of a sphere, or of a cylinder square to the plane."""
+        return cls(radius, radius, radius, forward, up)
+
+    def grown(self, by: float) -> Section:
+        """Return the section grown by a distance [m] on all sides."""
+        grown = (self.half_width + by, self.half_height + by, self.corner_radius + by)
+        return Section(*grown, self.forward, self.up)
+
+    @property
+    def core(self) -> tuple[float, float]:
+        """Half extents of the rectangle of the corners' centres: across z, and along it [m]."""
+        across, along = self.half_width - self.corner_radius, self.half_height - self.corner_radius
+        return max(0.0, across), max(0.0, along)
+
+    def signed_distance(self, points: np.ndarray) -> np.ndarray:
+        """Return distances (k,) [m] of points (k, 2), forward and up; positive outside."""
+        excess = np.abs(points - [self.forward, self.up]) - self.core
+        outside = np.linalg.norm(np.maximum(excess, 0.0), axis=1)
+        return outside + np.minimum(excess.max(axis=1), 0.0) - self.corner_radius
+
+    def knots(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return positions (k,) along the contour [m] and headings (k,) there, linear between.
+
+        Positions count from the middle of the side that faces the base, upwards; from the lower
+        end of its lower corner, round to the lower end of the far side.
+        """
+        across, along = self.core
+        quarter = self.corner_radius * math.pi / 2
+        steps = [quarter, 2 * along, quarter, 2 * across, quarter, 2 * along]
+        positions = np.concatenate([[0.0], np.cumsum(steps)]) - quarter - along
+        return positions, np.radians([-90, 0, 0, 90, 90, 180, 180])
+
+    def at(self, position: float) -> tuple[float, float, float, float]:
+        """Return forward, up, heading and curvature of the near side or its corners."""
+        across, along = self.core
+        rho = self.corner_radius
+        beyond = math.copysign(max(0.0, abs(position) - along), position)
+        heading = beyond / rho
+        forward = self.forward - across - rho * math.cos(heading)
+        up = self.up + max(-along, min(along, position)) + rho * math.sin(heading)
+        return forward, up, heading, 1 / rho if beyond else 0.0
+
+
+@dataclass(frozen=True)
+class LeadIn:
+    """The way from the base to the contour.
+
+    Attributes:
+        length: [m].
+        heading: Heading [rad] as a polynomial of the fraction of the length.
+        join: Position on the contour at which it joins; see `Section.knots` [m].
+        bending: Integral of its squared curvature [1/m].
+    """
+
+    length: float
+    heading: Polynomial
+    join: float
+    bending: float
+
+    def points(self, count: int) -> np.ndarray:
+        """Points (count, 2), forward and up, from the base to the join."""
+        f = np.linspace(0.0, 1.0, count)
+        psi = self.heading(f[:, None] * _NODES)
+        return (self.length * f)[:, None] * np.stack(
+            [np.sin(psi) @ _WEIGHTS, np.cos(psi) @ _WEIGHTS], axis=1
+        )
+
+
+def contour(
+    name: str, length: float, section: Section, clearance: float, join: float | None = None
+) -> PlanarCurve:
+    """Return the curve that leads to an object's contour and follows it to the curve's end.
+
+    Args:
+        name: What it is.
+        length: Arc length of the whole curve [m].
+        section: The object's section in the plane of z and x.
+        clearance: Between the section and the backbone, the disks' radius included [m].
+        join: Where on the contour the lead-in ends, counted along it from the middle of the side
+            that faces the base, upwards [m]; ``None``: where it bends least.
+
+    Raises:
+        InvalidValue: The base is on or in the contour, no smooth lead-in outside of the contour
+            leads to it, or the curve is too short to reach it or long enough to come round.
+    """
+    length = checks.real("length", length, above=0, high=1e3, unit="m")
+    wanted = section.grown(checks.real("clearance", clearance, above=0, high=1e3, unit="m"))
+    depth = -float(wanted.signed_distance(np.zeros((1, 2)))[0])
+    if depth >= 0:
+        raise InvalidValue(
+            "base",
+            [0.0, 0.0],
+            f"outside of the contour, {clearance * 1e3:.4g} mm off the object"
+            f" (it is {depth * 1e3:.4g} mm inside)",
+        )
+    lead = lead_in(wanted, join) if join is not None else least_lead_in(wanted)
+    return follow(name, length, wanted, lead)
+
+
+def follow(name: str, length: float, wanted: Section, lead: LeadIn) -> PlanarCurve:
+    """Return the curve along a lead-in and then the contour that it leads to."""
+    positions, headings = wanted.knots()
+    longest = lead.length + float(positions[-1]) - lead.join
+    if not lead.length < length <= longest:
+        raise InvalidValue(
+            "length",
+            length,
+            f"more than the {lead.length * 1e3:.4g} mm that lead to the contour and at most the"
+            f" {longest * 1e3:.4g} mm that end behind the object",
+        )
+    bend = lead.heading.deriv()
+    rates = np.diff(headings) / np.maximum(np.diff(positions), 1e-300)
+
+    def heading(s: np.ndarray) -> np.ndarray:
+        along = np.interp(s - lead.length + lead.join, positions, headings)
+        return np.where(s < lead.length, lead.heading(s / lead.length), along)
+
+    def curvature(s: np.ndarray) -> np.ndarray:
+        piece = np.searchsorted(positions, s - lead.length + lead.join, side="right") - 1
+        along = rates[np.clip(piece, 0, len(rates) - 1)]
+        return np.where(s < lead.length, bend(s / lead.length) / lead.length, along)
+
+    breaks = (lead.length, *(lead.length + positions - lead.join))
+    return PlanarCurve(name, length, heading, curvature, breaks=breaks)
+
+
+def lead_in(wanted: Section, join: float) -> LeadIn:
+    """Return the lead-in to a position on a contour; see `contour`.
+
+    Raises:
+        InvalidValue: None leads there, or it passes through the contour, saying how deep.
+    """
+    reach = wanted.core[1] + wanted.corner_radius * _STEEPEST
+    join = checks.real("join", join, low=-reach, high=reach, unit="m")
+    lead = _solved(wanted, join, None)
+    if lead is None:
+        raise InvalidValue("join", join, "a position that a smooth curve from the base leads to")
+    deepest = -float(wanted.signed_distance(lead.points(_LOOKS)).min())
+    if deepest > _INSIDE:
+        raise InvalidValue(
+            "join",
+            join,
+            "a position that is reached from outside of the contour"
+            f" (the way to it passes {deepest * 1e3:.3g} mm through it)",
+        )
+    return lead
+
+
+def least_lead_in(wanted: Section, low: float = -math.inf, high: float = math.inf) -> LeadIn:
+    """Return the lead-in that bends least (integral of squared curvature), outside of the contour.
+
+    Args:
+        wanted: The contour.
+        low: Least position of the join [m]; see `Section.knots`.
+        high: Largest position of the join [m].
+
+    Raises:
+        InvalidValue: There is none.
+    """
+    reach = wanted.core[1] + wanted.corner_radius * _STEEPEST
+    joins = np.linspace(max(-reach, low), min(reach, high), _JOINS)
+    found: list[LeadIn | None] = []
+    last: LeadIn | None = None
+    for join in joins[::-1]:  # from above: there the lead-in is longest and bends gently
+        last = _outside(wanted, float(join), last)
+        found.append(last)
+    best = min((x for x in found if x is not None), key=lambda x: x.bending, default=None)
+    if best is None:
+        raise InvalidValue(
+            "base",
+            [0.0, 0.0],
+            "where a smooth curve along z leads to the contour from outside (its middle is"
+            f" {wanted.forward * 1e3:.4g} mm in front and {wanted.up * 1e3:.4g} mm up, its side"
+            f" {(wanted.forward - wanted.half_width) * 1e3:.4g} mm in front)",
+        )
+    step = float(joins[1] - joins[0]) / 2
+    for _ in range(_REFINEMENTS):  # a parabola's minimum, bracketed by halving steps
+        near = [_outside(wanted, best.join + d, best) for d in (-step, step)]
+        inside = [x for x in near if x is not None and low <= x.join <= high]
+        best = min([best, *inside], key=lambda x: x.bending)
+        step /= 2
+    return best
+
+
+def _outside(wanted: Section, join: float, guess: LeadIn | None) -> LeadIn | None:
+    lead = _solved(wanted, join, guess) or (_solved(wanted, join, None) if guess else None)
+    if lead is None or wanted.signed_distance(lead.points(_LOOKS)).min() < -_INSIDE:
+        return None
+    return lead
+
+
+def _solved(wanted: Section, join: float, guess: LeadIn | None) -> LeadIn | None:
+    """Solve for length and curvature of the lead-in by Newton's method; None if it fails.
+
+    With f the fraction of the length m, m kappa = m c f + f (1 - f) (p + q f), which is 0 at the
+    base and m c, of the contour's curvature c, at the join. The unknowns m, p and q bring position
+    and heading there to the contour's.
+    """
+    forward, up, heading, c = wanted.at(join)
+    size = math.hypot(forward, up)
+    goal = np.array([forward / size, up / size, heading])
+    c *= size
+    if guess is None:
+        x = np.array([1.0, 0.0, 0.0])
+    else:
+        bend = guess.heading.deriv().coef
+        bend = np.concatenate([bend, np.zeros(4 - len(bend))])
+        # m c f + f (1 - f) (p + q f) = (m c + p) f + (q - p) f^2 - q f^3
+        x = np.array([guess.length / size, -bend[2] - bend[3], -bend[3]])
+    t = _NODES
+    by_p, by_q = t**2 / 2 - t**3 / 3, t**3 / 3 - t**4 / 4  # heading per p and per q
+    for _ in range(40):
+        m, p, q = x
+        psi = m * c * t**2 / 2 + p * by_p + q * by_q
+        sine, cosine = np.sin(psi), np.cos(psi)
+        reached = np.array([m * (sine @ _WEIGHTS), m * (cosine @ _WEIGHTS), 0.0])
+        reached[2] = m * c / 2 + p / 6 + q / 12
+        error = reached - goal
+        if np.abs(error).max() < _TOLERANCE:
+            break
+        columns = [c * t**2 / 2, by_p, by_q]
+        jacobian = np.array(
+            [
+                [m * ((cosine * d) @ _WEIGHTS) for d in columns],
+                [-m * ((sine * d) @ _WEIGHTS) for d in columns],
+                [c / 2, 1 / 6, 1 / 12],
+            ]
+        )
+        jacobian[:2, 0] += reached[:2] / m
+        step = np.linalg.solve(jacobian, -error)
+        x = x + step * min(1.0, 0.3 * m / max(abs(step[0]), 1e-12), 3.0 / np.abs(step[1:]).max())
+        if not (np.isfinite(x).all() and 0.2 < x[0] < 10 and np.abs(x).max() < 1e3):
+            return None
+    else:
+        return None
+    m, p, q = (float(v) for v in x)
+    turn = Polynomial([0, m * c + p, q - p, -q])
+    bending = float((turn(t) ** 2) @ _WEIGHTS) / (m * size)
+    return LeadIn(m * size, turn.integ(), join, bending)
