@@ -136,11 +136,10 @@ def rest_coordinates(finger: Finger, arcs_per_segment: int, order: int) -> np.nd
         arcs_per_segment: A multiple of `Finger.rest_pieces`.
         order: Of the arcs' curvature.
     """
-    knots = finger.rest_curvature_knots
+    start, end = finger.rest_curvature_ends[:, :, :, None].transpose(2, 0, 1, 3, 4)
     k = arcs_per_segment // finger.rest_pieces
-    part = np.arange(k + 1)[:, None] / k
-    ends = knots[:, :-1, None] + part * (knots[:, 1:, None] - knots[:, :-1, None])  # (n, ., k+1, 3)
-    turns = ends * (finger.segment_length / arcs_per_segment)
+    knots = start + np.arange(k + 1)[:, None] / k * (end - start)  # (n, pieces, k + 1, 3)
+    turns = knots * (finger.segment_length / arcs_per_segment)
     mean, half = (turns[:, :, 1:] + turns[:, :, :-1]) / 2, (turns[:, :, 1:] - turns[:, :, :-1]) / 2
     return np.concatenate([mean, half][: order + 1], axis=3).reshape(-1, 3 * (order + 1))
 

@@ -72,8 +72,8 @@ class Finger:
         cables: The cables, in the order in which pulls are given.
         youngs_modulus: E [Pa], or ``None``: forces are then per EI.
         rest_curvature: (n, 3) curvature [1/m] of each segment at rest, in the frame that is carried
-            along it; or (n, k + 1, 3): at the ends of k equal pieces of each segment, linear
-            between.
+            along it; or (n, 2 k, 3): at the start and at the end of each of its k equal pieces,
+            linear between.
         holes_per_disk: Number of clock holes on a disk.
         obstacles: What the finger may touch, in the frame of its base.
     """
@@ -132,9 +132,9 @@ class Finger:
             if len(value) != n:
                 raise InvalidValue("rest_curvature", value, f"{allowed} (got {len(value)})")
             if checks.is_list(value[0]) and len(value[0]) and checks.is_list(value[0][0]):
-                knots = len(value[0])
+                ends = len(value[0])
                 rest = np.array(
-                    [_curvatures(f"rest_curvature[{i}]", v, knots) for i, v in enumerate(value)]
+                    [_curvatures(f"rest_curvature[{i}]", v, ends) for i, v in enumerate(value)]
                 )
             else:
                 rest = np.array(
@@ -219,19 +219,21 @@ class Finger:
 
     @property
     def rest_varies(self) -> bool:
-        """Whether the rest curvature is given at several places of each segment."""
+        """Whether the rest curvature varies along segments."""
         return np.asarray(self.rest_curvature).ndim == 3
 
     @property
     def rest_pieces(self) -> int:
         """Number k of pieces of a segment along which the rest curvature is linear."""
-        return np.asarray(self.rest_curvature).shape[1] - 1 if self.rest_varies else 1
+        return np.asarray(self.rest_curvature).shape[1] // 2 if self.rest_varies else 1
 
     @property
-    def rest_curvature_knots(self) -> np.ndarray:
-        """Rest curvature (n, k + 1, 3) [1/m] at the ends of each segment's pieces."""
+    def rest_curvature_ends(self) -> np.ndarray:
+        """Rest curvature (n, k, 2, 3) [1/m] at the start and the end of each segment's pieces."""
         rest = np.asarray(self.rest_curvature)
-        return rest if self.rest_varies else np.repeat(rest[:, None, :], 2, axis=1)
+        if self.rest_varies:
+            return rest.reshape(self.segments, -1, 2, 3)
+        return np.repeat(rest[:, None, None, :], 2, axis=2)
 
     @property
     def second_moment(self) -> float:
@@ -290,15 +292,16 @@ class Finger:
         )
 
 
-def _curvatures(place: str, value: Any, knots: int) -> np.ndarray:
-    """Return the curvature (knots, 3) at the ends of a segment's pieces."""
+def _curvatures(place: str, value: Any, ends: int) -> np.ndarray:
+    """Return the curvature (ends, 3) at the start and the end of each of a segment's pieces."""
+    most = 2 * MAX_PIECES
     count = len(value) if checks.is_list(value) else 0
-    if count != knots or not 2 <= count <= MAX_PIECES + 1:
-        number = f"{knots}" if count and 2 <= knots <= MAX_PIECES + 1 else f"2..{MAX_PIECES + 1}"
+    if count != ends or not 2 <= ends <= most or ends % 2:
+        number = str(ends) if 2 <= ends <= most and ends % 2 == 0 else f"2, 4, .. or {most}"
         raise InvalidValue(
             place,
             value,
-            f"{number} vectors of 3 numbers [1/m], from its start to its end,"
+            f"{number} vectors of 3 numbers [1/m], at the start and the end of each of its pieces,"
             " as many for each segment",
         )
     return np.array([checks.vector(f"{place}[{i}]", v, 3, unit="1/m") for i, v in enumerate(value)])

@@ -98,14 +98,14 @@ def test_rest_curvature_at_several_places_of_segments():
     constant = np.random.default_rng(1).normal(size=(9, 3))
     finger = make_finger(rest_curvature=constant)
     assert not finger.rest_varies and finger.rest_pieces == 1 and not make_finger().rest_varies
-    assert np.array_equal(finger.rest_curvature_knots, np.stack([constant, constant], axis=1))
+    assert np.array_equal(finger.rest_curvature_ends[:, 0], np.stack([constant] * 2, axis=1))
     for pieces in (1, 2, 8):
-        knots = np.stack([k * constant for k in range(pieces + 1)], axis=1)
-        finger = make_finger(rest_curvature=knots)
+        ends = np.stack([k * constant for k in range(2 * pieces)], axis=1)
+        finger = make_finger(rest_curvature=ends)
         assert finger.rest_varies and finger.rest_pieces == pieces
-        assert np.array_equal(finger.rest_curvature_knots, knots)
+        assert np.array_equal(finger.rest_curvature_ends, ends.reshape(9, pieces, 2, 3))
     with pytest.raises(ValueError, match="read-only"):
-        finger.rest_curvature_knots[0, 0, 0] = 2
+        finger.rest_curvature_ends[0, 0, 0, 0] = 2
 
 
 def test_numpy_numbers_become_plain_ones():
@@ -139,7 +139,7 @@ def test_numpy_numbers_become_plain_ones():
         ({"rest_curvature": np.zeros((8, 3))}, "rest_curvature"),
         ({"rest_curvature": np.zeros(27)}, "rest_curvature"),
         ({"rest_curvature": np.array(0.0)}, "rest_curvature"),
-        ({"rest_curvature": np.zeros((9, 10, 3))}, "rest_curvature[0]"),
+        ({"rest_curvature": np.zeros((9, 18, 3))}, "rest_curvature[0]"),
         ({"rest_curvature": np.full((9, 2, 3), 125.0)}, "rest_curvature[0][0]"),
         ({"rest_curvature": np.full((9, 3), np.inf)}, "rest_curvature[0][0]"),
     ],

@@ -17,16 +17,16 @@ from .fingers import helical_cable, make_finger, rms, straight_cable
 PULL = [0.003]
 
 
-def knots(seed: int, pieces: int = 1, segments: int = 9) -> np.ndarray:
-    """Curvature at the ends of the pieces, continuous over the disks."""
-    all_knots = np.random.default_rng(seed).normal(size=(segments * pieces + 1, 3)) * [5, 5, 2]
-    return np.array([all_knots[i * pieces : (i + 1) * pieces + 1] for i in range(segments)])
+def ends(seed: int, pieces: int = 1, segments: int = 9) -> np.ndarray:
+    """Curvature at both ends of each piece, with jumps within and between segments."""
+    return np.random.default_rng(seed).normal(size=(segments, 2 * pieces, 3)) * [5, 5, 2]
 
 
-def coefficients(knots: np.ndarray) -> np.ndarray:
+def coefficients(ends: np.ndarray) -> np.ndarray:
     """The mean and the linear part (n, k, 2, 3) of every piece, as `Solution.curvature` has."""
-    start, end = knots[:, :-1], knots[:, 1:]
-    return np.stack([(start + end) / 2, (end - start) / 2], axis=2)
+    return np.stack(
+        [(ends[:, 1::2] + ends[:, ::2]) / 2, (ends[:, 1::2] - ends[:, ::2]) / 2], axis=2
+    )
 
 
 def test_equal_ends_are_the_constant_rest_curvature():
@@ -39,10 +39,10 @@ def test_equal_ends_are_the_constant_rest_curvature():
 @given(seed=st.integers(0, 10**6), pieces=st.integers(1, 3))
 @settings(max_examples=10)
 def test_at_rest_a_finger_has_its_rest_curvature_and_no_energy(seed: int, pieces: int) -> None:
-    finger = make_finger(rest_curvature=knots(seed, pieces))
+    finger = make_finger(rest_curvature=ends(seed, pieces))
     rest = FingerSolver(finger).rest
     assert rest.energy == 0 and not rest.tensions.any()
-    wanted = coefficients(finger.rest_curvature_knots)
+    wanted = coefficients(finger.rest_curvature)
     assert rest.curvature == pytest.approx(wanted)
     curve = centerline(wanted.reshape(-1, 2, 3), finger.length, 8)
     assert rest.backbone == pytest.approx(curve[:: 8 * pieces], abs=1e-10)
@@ -54,7 +54,7 @@ def test_at_rest_a_finger_has_its_rest_curvature_and_no_energy(seed: int, pieces
 def test_more_arcs_converge_fast(pull, pieces):
     short = {"segments": 3, "length": 0.0607}  # of the same segments
     cable = Cable.from_holes("main", [7, 8, 9, 11])
-    finger = make_finger(cable, rest_curvature=knots(4, pieces, 3), **short)
+    finger = make_finger(cable, rest_curvature=ends(4, pieces, 3), **short)
 
     def pose(arcs: int, order: int = 1) -> np.ndarray:
         settings = SolverSettings(arcs_per_segment=arcs, curvature_order=order)
@@ -67,28 +67,29 @@ def test_more_arcs_converge_fast(pull, pieces):
 
 
 def test_pieces_on_one_line_are_one_piece():
-    ends = knots(9)
-    split = np.stack([ends[:, 0], ends.mean(axis=1), ends[:, 1]], axis=1)
+    whole = ends(9)
+    middle = whole.mean(axis=1)
+    split = np.stack([whole[:, 0], middle, middle, whole[:, 1]], axis=1)
     settings = SolverSettings(arcs_per_segment=2)
-    one = solve(make_finger(rest_curvature=ends), PULL, settings)
+    one = solve(make_finger(rest_curvature=whole), PULL, settings)
     assert solve(make_finger(rest_curvature=split), PULL).backbone == pytest.approx(
         one.backbone, abs=1e-10
     )
 
 
 def test_constant_arcs_take_the_mean():
-    ends = knots(5)
+    rest = ends(5)
     settings = SolverSettings(curvature_order=0)
-    means = make_finger(rest_curvature=ends.mean(axis=1))
-    one = solve(make_finger(rest_curvature=ends), PULL, settings)
+    means = make_finger(rest_curvature=rest.mean(axis=1))
+    one = solve(make_finger(rest_curvature=rest), PULL, settings)
     assert one.backbone == pytest.approx(solve(means, PULL, settings).backbone, abs=1e-10)
 
 
 def test_fine_fingers_keep_a_rest_curvature_that_varies():
     cable = straight_cable(4, 31)
-    ends = knots(6, segments=30)
-    varying = make_finger(cable, segments=30, rest_curvature=ends)
-    constant = make_finger(cable, segments=30, rest_curvature=ends.mean(axis=1))
+    rest = ends(6, segments=30)
+    varying = make_finger(cable, segments=30, rest_curvature=rest)
+    constant = make_finger(cable, segments=30, rest_curvature=rest.mean(axis=1))
     assert EquilibriumProblem(varying).rod.order == 1
     assert EquilibriumProblem(constant).rod.order == 0
     assert EquilibriumProblem(varying, SolverSettings(curvature_order=0)).rod.order == 0
@@ -101,7 +102,7 @@ def test_a_problem_takes_another_rest_shape(order, pieces):
     cables = (straight_cable(3, 6), helical_cable())
     first = EquilibriumProblem(make_finger(*cables), settings)
     straight = first.rest_lengths.copy()
-    rest = knots(7, pieces)
+    rest = ends(7, pieces)
     other = first.with_rest_curvature(rest)
     settings = SolverSettings(curvature_order=order, arcs_per_segment=2 // pieces)
     fresh = EquilibriumProblem(make_finger(*cables, rest_curvature=rest), settings)
@@ -116,4 +117,4 @@ def test_a_problem_takes_another_rest_shape(order, pieces):
     with pytest.raises(InvalidValue, match="rest_curvature"):
         first.with_rest_curvature(rest[:8])
     with pytest.raises(InvalidValue, match="that 2 arcs per segment can follow"):
-        first.with_rest_curvature(knots(7, 3))
+        first.with_rest_curvature(ends(7, 3))
