@@ -2,7 +2,6 @@
 """Services and clients."""
 
 import threading
-import time
 
 import pytest
 from rclpy.callback_groups import ReentrantCallbackGroup
@@ -158,13 +157,14 @@ def test_introspection_publishes_what_passes(pair, spin):
     server, user, client = pair
     service = next(one for one in server.services if one.service_name == "/flip")
     events = []
-    server.create_subscription(SetBool.Event, "/flip/_service_event", events.append, 10)
+    subscription = server.create_subscription(
+        SetBool.Event, "/flip/_service_event", events.append, 10
+    )
     for end, node in ((service, server), (client, user)):
         end.configure_introspection(
             node.get_clock(), qos_profile_system_default, ServiceIntrospectionState.CONTENTS
         )
-    assert spin(lambda: server.count_publishers("/flip/_service_event") == 2, server)
-    time.sleep(0.2)  # the subscription has yet to match them
+    assert spin(lambda: subscription.get_publisher_count() == 2, server)
     client.call_async(SetBool.Request(data=True))
     assert spin(lambda: len(events) == 4, server, user)
     by_kind = {event.info.event_type: event for event in events}

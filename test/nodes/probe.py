@@ -61,14 +61,19 @@ class Probe:
             self.executor.spin_once(timeout_sec=0.02)
 
     def listen(self, kind: type, topic: str, latched: bool = True, depth: int = 300) -> list[Any]:
-        """Subscribe; return the list that the messages are appended to."""
+        """Subscribe once; return the list that the messages are appended to."""
         if topic not in self.heard:
-            self.heard[topic] = []
-            qos = QoSProfile(depth=depth)
-            if latched:
-                qos.durability = DurabilityPolicy.TRANSIENT_LOCAL
-            self.node.create_subscription(kind, topic, self.heard[topic].append, qos)
+            self.heard[topic] = self.join(kind, topic, latched, depth)
         return self.heard[topic]
+
+    def join(self, kind: type, topic: str, latched: bool = True, depth: int = 300) -> list[Any]:
+        """As :meth:`listen`, with a subscription of its own, that comes after the messages."""
+        qos = QoSProfile(depth=depth)
+        if latched:
+            qos.durability = DurabilityPolicy.TRANSIENT_LOCAL
+        heard: list[Any] = []
+        self.node.create_subscription(kind, topic, heard.append, qos)
+        return heard
 
     def states(self, finger: str) -> list[FingerState]:
         return self.listen(FingerState, f"{finger}/state")
@@ -120,13 +125,15 @@ class Probe:
         self.states(finger)
         return self.solved(finger, self.pull(finger, pulls, names))
 
+    def statuses(self, name: str) -> list[DiagnosticStatus]:
+        """Return every status whose name ends so, oldest first."""
+        found = [status for array in self.diagnostics() for status in array.status]
+        return [status for status in found if status.name.endswith(name)]
+
     def status(self, name: str) -> DiagnosticStatus | None:
         """Return the newest status whose name ends so."""
-        for array in reversed(self.diagnostics()):
-            for status in array.status:
-                if status.name.endswith(name):
-                    return status
-        return None
+        found = self.statuses(name)
+        return found[-1] if found else None
 
 
 def sphere(name: str, radius: float, center: tuple[float, float, float]) -> Object:

@@ -6,7 +6,7 @@ from probe import shown
 from rcl_interfaces.srv import SetParameters
 from rclpy.exceptions import ParameterException
 from rclpy.parameter import Parameter
-from visualization_msgs.msg import Marker
+from visualization_msgs.msg import Marker, MarkerArray
 
 from ccr_ros.model import CcrError
 
@@ -141,9 +141,14 @@ def test_a_stale_finger_is_see_through(probe, start, small_gripper):
 
 def test_late_joiner_gets_the_last_markers(probe, start, small_gripper):
     start(gripper_file=small_gripper)
-    probe.pull_and_wait("thumb", [0.005, 0.0])
-    probe.spin_for(0.3)  # the markers have been sent, to nobody
-    array = probe.until(probe.markers, "the latched markers")[0]
+    arrays = probe.markers()
+
+    def complete():
+        return arrays and all(shown(arrays[-1], f"{f}/disks") for f in ("thumb", "index"))
+
+    probe.until(complete, "markers of both fingers")
+    late = probe.join(MarkerArray, "markers")
+    array = probe.until(lambda: late, "the latched markers")[0]
     assert len(shown(array, "index/disks")) == 10
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from probe import shown
+from visualization_msgs.msg import MarkerArray
 
 ROOT = Path(__file__).resolve().parents[2]
 RUN = "import sys; from ccr_ros.nodes.entry import solver_node; sys.exit(solver_node())"
@@ -71,8 +72,11 @@ def test_two_processes_and_a_probe(probe, launch, small_gripper):
 def test_who_comes_late_sees_all_at_once(probe, launch):
     process = launch("-r", "__ns:=/gripper")
     probe.pull_and_wait("finger_2", [0.003])
-    probe.spin_for(0.3)
-    array = probe.until(probe.markers, "the latched markers")[0]
+    arrays = probe.markers()
+    fingers = [f"finger_{i}/disks" for i in (1, 2, 3)]
+    probe.until(lambda: arrays and all(shown(arrays[-1], f) for f in fingers), "all fingers")
+    late = probe.join(MarkerArray, "markers")
+    array = probe.until(lambda: late, "the latched markers")[0]
     assert len(shown(array, "finger_3/disks")) == 10
     assert end(process, signal.SIGINT) == 0
 

@@ -82,17 +82,14 @@ def test_call_reads_standard_input_and_short_types(ccr, flip, monkeypatch):
     assert "success=True" in done.out
 
 
-def test_call_waits_for_the_service_and_says_so(ccr, make_peer):
-    node = make_peer("late")
-
-    def serve():
-        node.create_service(SetBool, "/late", lambda request, response: response)
-        timer.cancel()
-
-    timer = node.create_timer(2.5, serve)
-    done = ccr("service", "call", "/late", "std_srvs/srv/SetBool")
-    assert done.out.startswith("waiting for service to become available...\nrequester: ")
-    assert done.code == 0
+@pytest.mark.processes
+def test_call_waits_for_the_service_and_says_so(start_ccr, peer):
+    process = start_ccr("service", "call", "/late", "std_srvs/srv/SetBool", "--timeout", "30")
+    assert process.stdout.readline() == "waiting for service to become available...\n"
+    peer.create_service(SetBool, "/late", lambda request, response: response)
+    out, err = process.communicate(timeout=60)
+    assert out.startswith("requester: making request: ")
+    assert (process.returncode, err) == (0, "")
 
 
 def test_call_gives_up(ccr, flip):

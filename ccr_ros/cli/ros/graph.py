@@ -17,9 +17,10 @@ from ccr_ros.model.errors import CcrError
 NODE_PREFIX = "_ccr_cli"
 EXIT_TERMINATED = 143  # 128 + SIGTERM, as shells report it
 
-# The graph counts as known once it has not changed for _QUIET seconds; Fast DDS finds it in steps
-# that may be further apart.
-_QUIET, _QUIET_FAST_DDS, _LIMIT, _STEP = 0.5, 1.5, 5.0, 0.05
+# The graph counts as known once so many looks, _STEP seconds apart, have shown nothing new: looks
+# and not seconds, as on a busy machine others answer late, and the looks are late as well. Fast DDS
+# finds the graph in steps that may be further apart.
+_LOOKS, _LOOKS_FAST_DDS, _LIMIT, _STEP = 10, 30, 10.0, 0.05
 
 NamesAndTypes = list[tuple[str, list[str]]]
 
@@ -102,20 +103,20 @@ def _settle(node: Any) -> None:
     from rclpy.utilities import get_rmw_implementation_identifier
 
     fast_dds = "fastrtps" in get_rmw_implementation_identifier()
-    wanted = _QUIET_FAST_DDS if fast_dds else _QUIET
+    wanted = _LOOKS_FAST_DDS if fast_dds else _LOOKS
     seen: Any = None
-    since = time.monotonic()
+    looks = 0
 
     def quiet() -> bool:
-        nonlocal seen, since
+        nonlocal seen, looks
         now = (
             sorted(node.get_node_names_and_namespaces()),
             node.get_topic_names_and_types(),
             node.get_service_names_and_types(),
         )
-        if now != seen:
-            seen, since = now, time.monotonic()
-        return time.monotonic() - since >= wanted
+        looks = looks + 1 if now == seen else 0
+        seen = now
+        return looks >= wanted
 
     spin_until(node, quiet, _LIMIT)
 

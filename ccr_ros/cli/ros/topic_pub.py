@@ -14,6 +14,9 @@ from ccr_ros.cli.ros.types import fill, message_type, read_values
 from ccr_ros.cli.ros.verbs import Verbs, natural, positive_float
 from ccr_ros.model.errors import CcrError
 
+#: How long the last message may be on its way to reliable subscriptions [s].
+_ACKNOWLEDGED_WITHIN = 5.0
+
 
 def add_verb(verbs: Verbs) -> None:
     """Declare ``pub``."""
@@ -64,6 +67,7 @@ def add_verb(verbs: Verbs) -> None:
 def run_pub(args: argparse.Namespace) -> None:
     """Publish until told to end."""
     import rclpy
+    from rclpy.duration import Duration
 
     times = 1 if args.once else args.times
     wanted = args.wait_matching_subscriptions
@@ -97,6 +101,8 @@ def run_pub(args: argparse.Namespace) -> None:
             node.create_timer(1.0 / args.rate, publish)
         while times == 0 or count < times:
             rclpy.spin_once(node)
+        # A subscription may find its publisher after that has found it.
+        publisher.wait_for_all_acked(Duration(seconds=_ACKNOWLEDGED_WITHIN))
         time.sleep(args.keep_alive)
 
 
