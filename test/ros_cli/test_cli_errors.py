@@ -47,6 +47,25 @@ PUB = ("topic", "pub", "-1", "-w", "0", "/x")
         ((*PUB, "std_msgs/UInt8", "data: high"), "data: 'high' is not allowed; must be uint8"),
         ((*PUB, "std_msgs/Int32", "data: 3.7"), "data: 3.7 is not allowed; must be int32"),
         ((*PUB, "std_msgs/Bool", "data: maybe"), "data: 'maybe' is not allowed; must be boolean"),
+        ((*PUB, "std_msgs/String", "data: null"), "data: None is not allowed; must be string"),
+        ((*PUB, "std_msgs/String", "data: [a]"), "data: ['a'] is not allowed; must be string"),
+        (
+            (*PUB, "sensor_msgs/JointState", "name: elbow"),
+            "name: 'elbow' is not allowed; must be sequence<string>",
+        ),
+        (
+            (*PUB, "sensor_msgs/JointState", 'name: ["\\uD800"]'),
+            "'\\ud800' is not Unicode text: surrogates not allowed",
+        ),
+        (
+            (*PUB, "std_msgs/String", "&all {data: *all}"),
+            "data: {'data': {'data': ",
+        ),
+        (
+            (*PUB, "std_msgs/srv/Empty"),
+            "message type: 'std_msgs/srv/Empty' is not allowed; must be written as package/msg/",
+        ),
+        ((*PUB, "std_msgs/Empty", "data: 1"), "data: unknown key; valid keys: none"),
         (
             (*PUB, "geometry_msgs/PoseArray", "poses: [{}, {position: {x: far}}]"),
             "poses[1].position.x: 'far' is not allowed; must be double",

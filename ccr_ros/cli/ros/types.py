@@ -6,7 +6,7 @@ from __future__ import annotations
 import copy
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import yaml
@@ -61,7 +61,7 @@ def _interface(kind: str, name: str, folder: str) -> Any:
     import rosidl_runtime_py
     from rosidl_runtime_py import utilities
 
-    if not _TYPE_NAME.fullmatch(name):
+    if not _TYPE_NAME.fullmatch(name) or name.split("/")[1:-1] not in ([], [folder]):
         raise InvalidValue(f"{kind} type", name, f"written as package/{folder}/Name")
     try:
         return getattr(utilities, f"get_{kind}")(name)
@@ -106,12 +106,30 @@ def read_yaml(text: str) -> Any:
         CcrError: it is no YAML.
     """
     try:
-        return yaml.safe_load(text)
+        values = yaml.safe_load(text)
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         place = f" at line {mark.line + 1}, column {mark.column + 1}" if mark else ""
         reason = getattr(error, "problem", None) or str(error).splitlines()[0]
         raise CcrError(f"not YAML{place}: {reason}: {' '.join(text.split())[:80]!r}") from error
+    for part in _texts(values):
+        try:
+            part.encode()
+        except UnicodeEncodeError as error:
+            raise CcrError(f"{part!r} is not Unicode text: {error.reason}") from error
+    return values
+
+
+def _texts(values: Any) -> Iterator[str]:
+    """Give every text in nested lists and mappings; YAML anchors can make them endless."""
+    waiting, seen = [values], set()
+    while waiting:
+        value = waiting.pop()
+        if isinstance(value, str):
+            yield value
+        elif isinstance(value, (dict, list)) and id(value) not in seen:
+            seen.add(id(value))
+            waiting += [*value, *value.values()] if isinstance(value, dict) else value
 
 
 def fill(message: Any, values: dict[str, Any], **expand: bool) -> list[Callable[[Any], None]]:
@@ -144,7 +162,7 @@ def _check(message: Any, values: dict[str, Any], place: str, expand: dict[str, b
     for key, value in values.items():
         where = f"{place}.{key}" if place else str(key)
         if key not in fields:
-            raise UnknownKey(where, value, ", ".join(fields))
+            raise UnknownKey(where, value, ", ".join(fields) or "none")
         part, element = getattr(message, key), _message_of_sequence(fields[key])
         if isinstance(value, dict) and hasattr(part, "get_fields_and_field_types"):
             _check(part, value, where, expand)
@@ -153,16 +171,27 @@ def _check(message: Any, values: dict[str, Any], place: str, expand: dict[str, b
                 if not isinstance(item, dict):
                     raise InvalidValue(f"{where}[{index}]", item, f"a mapping ({fields[key]})")
                 _check(element(), item, f"{where}[{index}]", expand)
-        # rosidl_runtime_py would make True of any text, and cut numbers.
-        if (isinstance(part, bool) and value not in (True, False)) or (
-            type(part) is int and isinstance(value, float) and not value.is_integer()
-        ):
+        if not _fits(part, value):
             raise InvalidValue(where, value, fields[key])
         try:
             # A copy, as rosidl_runtime_py puts messages into the lists that it is given.
             set_message_fields(type(message)(), {key: copy.deepcopy(value)}, **expand)
         except Exception as error:  # what is raised differs from field to field
             raise InvalidValue(where, value, fields[key]) from error
+
+
+def _fits(part: Any, value: Any) -> bool:
+    """Tell whether a value is of a field's kind, where rosidl_runtime_py would convert any.
+
+    It would make True of every text, cut numbers, and take texts apart and other things for text.
+    """
+    if isinstance(part, bool):
+        return value in (True, False)
+    if isinstance(part, str):
+        return value is not None and not isinstance(value, (dict, list))
+    if isinstance(part, list):
+        return not isinstance(value, str)
+    return not (type(part) is int and isinstance(value, float) and not value.is_integer())
 
 
 def _message_of_sequence(field_type: str) -> Any:
