@@ -47,14 +47,14 @@ def _smallest_eigenvalue(point: KktPoint) -> float:
     """
     rows, hessian = point.rows[point.active], point.hessian
     if len(rows):
-        q = _row_space(rows)
+        q = row_space(rows)
         half = hessian @ q
         raised = q.T @ half + np.eye(q.shape[1]) * (1.0 + float(np.abs(hessian).sum(axis=1).max()))
         hessian = hessian - half @ q.T - q @ half.T + q @ raised @ q.T
     return float(np.linalg.eigvalsh(hessian)[0])
 
 
-def _row_space(rows: np.ndarray) -> np.ndarray:
+def row_space(rows: np.ndarray) -> np.ndarray:
     """Orthonormal basis (N, rank) of the span of rows; twin constraints are not counted twice."""
     if len(rows) == 1:  # as mostly; a decomposition costs more than all the rest
         return rows.T / np.linalg.norm(rows)
@@ -66,7 +66,7 @@ def _null_space(point: KktPoint) -> np.ndarray:
     rows = point.rows[point.active]
     if not len(rows):
         return np.eye(len(point.hessian))
-    basis = _row_space(rows)
+    basis = row_space(rows)
     return np.linalg.qr(basis, mode="complete")[0][:, basis.shape[1] :]
 
 

@@ -57,6 +57,11 @@ class FingerSolver:
         return solver.solve(np.zeros(len(self.finger.cables)))
 
     @property
+    def point(self) -> KktPoint:
+        """Where the solver stands: the last pose that converged, with all derivatives."""
+        return self._point
+
+    @property
     def obstacles(self) -> tuple[Obstacle, ...]:
         """What the finger may touch, in its base frame; assign to replace.
 

@@ -96,9 +96,9 @@ def solve_sqp(
     price, best = 10.0, np.inf
     for iteration in range(max_iterations):
         slacks = point.slacks(bounds)
-        violation = _violation(point, slacks)
-        error = point.residual + violation
-        if point.residual <= settings.tolerance and violation <= settings.tolerance:
+        over = violation(point, slacks)
+        error = point.residual + over
+        if point.residual <= settings.tolerance and over <= settings.tolerance:
             return SqpResult(point, iteration, True)
         found = _qp_step(point, slacks) if time.thread_time() < deadline else None
         if found is None:
@@ -146,7 +146,7 @@ def _candidates(problem: EquilibriumProblem, at: Evaluation, forces: np.ndarray)
     return np.argwhere(near)
 
 
-def _violation(point: KktPoint, slacks: np.ndarray) -> float:
+def violation(point: KktPoint, slacks: np.ndarray) -> float:
     """Largest violation, or gap of a constraint that carries force (units of L)."""
     gap = np.where(point.active, np.abs(slacks), -slacks)
     return max(0.0, float(gap.max()))
@@ -172,10 +172,10 @@ def _qp_step(point: KktPoint, slacks: np.ndarray) -> tuple[np.ndarray, np.ndarra
         weight = _AUGMENT / np.maximum(np.einsum("ij,ij->i", held, held), 1e-12)
         hessian = hessian + (held.T * weight) @ held
         slope = slope - held.T @ (weight * slacks[active])
-    definite = _definite(hessian)
-    if definite is None:
+    solid = definite(hessian)
+    if solid is None:
         return None
-    solved = np.linalg.solve(definite, np.concatenate([slope[None], point.rows]).T)
+    solved = np.linalg.solve(solid, np.concatenate([slope[None], point.rows]).T)
     gram = point.rows @ solved
     multipliers = solve_multipliers(
         0.5 * (gram[:, 1:] + gram[:, 1:].T), slacks + gram[:, 0], active
@@ -186,7 +186,7 @@ def _qp_step(point: KktPoint, slacks: np.ndarray) -> tuple[np.ndarray, np.ndarra
     return (step, multipliers) if np.all(np.isfinite(step)) else None
 
 
-def _definite(matrix: np.ndarray) -> np.ndarray | None:
+def definite(matrix: np.ndarray) -> np.ndarray | None:
     """Return the matrix, its negative eigenvalues turned positive; None if it is not finite."""
     try:
         np.linalg.cholesky(matrix)

@@ -1,0 +1,198 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One problem of several fingers and the object between them.
+
+In units of the first finger's length L and of EI / L, with y_f the fingers' coordinates
+(`ccr_ros.model.equilibrium`) and q = (translation, rotation vector) a small motion of the object
+from where it is:
+
+    min   sum_f w_f 1/2 y_f.y_f - W.q      w_f = (EI / L)_f / (EI / L),  W: weight and other loads
+    s.t.  cable lengths of each finger <= their bounds                             (tensions)
+          -distance(points of finger f, object moved by q) <= 0                    (contact forces)
+
+With r the way from the object's centre to a point, n the outward normal and H the distance's
+Hessian there, a motion v of the point against the centre and a turn w of the object change the
+distance to second order by
+
+    n.(v - w x r) - n.(w x v) + 1/2 n.(w x (w x r)) + 1/2 u'H u,      u = v - w x r
+
+which gives rows and Hessian blocks below: each contact joins one finger and the object, so the
+matrix is block diagonal but for the object's border.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ccr_ros.model.equilibrium import EquilibriumProblem
+from ccr_ros.model.files import MountedFinger
+from ccr_ros.model.rotation import Pose, quaternion_from_matrix, skew
+from ccr_ros.model.settings import SolverSettings
+from ccr_ros.model.sqp import KktPoint, derive
+
+from .body import Body
+
+_EYE = np.eye(3)
+
+
+class Hand:
+    """The fingers of a gripper as equilibrium problems, built once.
+
+    Attributes:
+        mounted: The fingers with their bases.
+        problems: One per finger.
+        weights: (F,) EI / L of each finger relative to the first one's.
+        energy: EI / L of the first finger [J]; length: its length [m]: the units.
+    """
+
+    def __init__(
+        self, fingers: Sequence[MountedFinger], settings: SolverSettings | None = None
+    ) -> None:
+        self.mounted = tuple(fingers)
+        self.problems = [EquilibriumProblem(m.finger, settings) for m in fingers]
+        first = self.mounted[0].finger
+        self.length = first.length
+        self.energy = first.bending_stiffness / first.length
+        self.weights = np.array(
+            [m.finger.bending_stiffness / m.finger.length / self.energy for m in fingers]
+        )
+        self._turns = [m.base.rotation for m in fingers]
+        self._bases = [m.base for m in fingers]
+
+    def in_base(self, index: int, pose: Pose) -> Pose:
+        """Return a pose of the gripper's frame in the base frame of a finger."""
+        turn, base = self._turns[index], self._bases[index]
+        position = (pose.position - base.position) @ turn
+        return Pose(position, quaternion_from_matrix(turn.T @ pose.rotation))
+
+    def turn(self, index: int) -> np.ndarray:
+        """Return the rotation matrix (3, 3) of a finger's base in the gripper."""
+        return self._turns[index]
+
+
+@dataclass(frozen=True, eq=False)
+class FingerBlock:
+    """One finger's part of the problem at a point; in the finger's own units.
+
+    Attributes:
+        point: The finger with the object as its last obstacle.
+        touch: (k,) of the rows in ``point.rows``, which are contacts with the object.
+        columns: (C + c, 6) of all rows with respect to q.
+        border: (N, 6) of the Hessian, finger against q.
+        corner: (6, 6) the finger's share of the Hessian of q.
+    """
+
+    point: KktPoint
+    touch: np.ndarray
+    columns: np.ndarray
+    border: np.ndarray
+    corner: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class GraspPoint:
+    """All fingers and the object at one pose, with multipliers and derivatives.
+
+    Attributes:
+        pose: Of the object in the gripper.
+        blocks: One per finger.
+        load: (6,) force and moment on the object about its centre, in units.
+        unbalanced: (6,) what load and contacts leave over.
+        residual: Largest unbalanced generalised force relative to the largest elastic one or 1.
+    """
+
+    pose: Pose
+    blocks: tuple[FingerBlock, ...]
+    load: np.ndarray
+    unbalanced: np.ndarray
+    residual: float
+
+
+def block(
+    hand: Hand,
+    index: int,
+    body: Body,
+    pose: Pose,
+    y: np.ndarray,
+    tensions: np.ndarray,
+    forces: np.ndarray,
+) -> FingerBlock:
+    """Return one finger's part, at coordinates y (N,), with multipliers in its own units.
+
+    Args:
+        hand: The fingers.
+        index: Which of them.
+        body: The object.
+        pose: Of the object in the gripper.
+        y: The finger's coordinates.
+        tensions: (C,) multipliers of its cable lengths.
+        forces: (O, P) multipliers of its contacts; the last row is the object's.
+    """
+    problem = hand.problems[index]
+    local = hand.in_base(index, pose)
+    own = problem.finger.obstacles
+    problem.obstacles = (*own, body.shape.moved(local))
+    point = derive(problem, problem.evaluate(y), tensions, forces)
+    lengths = len(point.tensions)
+    at_object = np.flatnonzero(point.pairs[:, 0] == len(own)) if len(point.pairs) else np.empty(0)
+    touch = at_object.astype(int)
+    columns = np.zeros((len(point.rows), 6))
+    border, corner = np.zeros((problem.size, 6)), np.zeros((6, 6))
+    if len(touch):
+        scale = hand.length / problem.finger.length
+        frame = np.zeros((6, 6))  # q in the base frame and in the finger's units
+        frame[:3, :3], frame[3:, 3:] = hand.turn(index).T * scale, hand.turn(index).T
+        where = point.pairs[touch, 1]
+        arms = point.at.points[where] - local.position / problem.finger.length
+        normals = point.normals[touch]
+        pushed = np.concatenate([normals, np.cross(arms, normals)], axis=1)
+        columns[lengths + touch] = pushed @ frame
+        pressed = np.flatnonzero(point.multipliers[lengths + touch] > 0)
+        if len(pressed):
+            force = point.multipliers[lengths + touch[pressed]]
+            _second_order(problem, point, where[pressed], arms[pressed], force, border, corner)
+            border, corner = border @ frame, frame.T @ corner @ frame
+    return FingerBlock(point, lengths + touch, columns, border, corner)
+
+
+def _second_order(
+    problem: EquilibriumProblem,
+    point: KktPoint,
+    where: np.ndarray,
+    arms: np.ndarray,
+    force: np.ndarray,
+    border: np.ndarray,
+    corner: np.ndarray,
+) -> None:
+    """Add the second derivatives of -force x distance to border and corner, base frame."""
+    normals, hessians = problem.obstacles[-1].derivatives(
+        point.at.points[where] * problem.finger.length
+    )
+    hessians = hessians * problem.finger.length
+    motion = np.concatenate([np.tile(-_EYE, (len(arms), 1, 1)), skew(arms)], axis=2)  # u by q
+    bent = hessians @ motion
+    by_point = bent.copy()
+    by_point[:, :, 3:] -= skew(normals)
+    jacobian = point.first.points[where]
+    border -= np.einsum("k,kin,kij->nj", force, jacobian, by_point)
+    corner -= np.einsum("k,kai,kaj->ij", force, motion, bent)
+    turned = np.einsum("k,kij->ij", force, skew(normals))
+    corner[:3, 3:] -= turned
+    corner[3:, :3] -= turned.T
+    outer = np.einsum("k,ki,kj->ij", force, normals, arms)
+    corner[3:, 3:] -= 0.5 * (outer + outer.T) - np.trace(outer) * _EYE
+
+
+def gather(hand: Hand, pose: Pose, blocks: Sequence[FingerBlock], load: np.ndarray) -> GraspPoint:
+    """Put the blocks together and say how far from equilibrium all is."""
+    unbalanced = -load
+    worst, largest = 0.0, 1.0
+    for weight, part in zip(hand.weights, blocks, strict=True):
+        point = part.point
+        unbalanced = unbalanced + weight * (point.multipliers @ part.columns)
+        worst = max(worst, point.residual * max(1.0, float(np.abs(point.at.y).max())))
+        largest = max(largest, float(np.abs(point.at.y).max()))
+    residual = max(worst, float(np.abs(unbalanced).max())) / largest
+    return GraspPoint(pose, tuple(blocks), load, unbalanced, residual)
