@@ -7,6 +7,7 @@ import random
 import pytest
 from hypothesis import settings
 
+from ccr_ros.blas import use_one_thread
 from ccr_ros.runtime import enable_ros
 from ccr_ros.stack.environment import DOMAINS, is_free
 
@@ -24,6 +25,7 @@ def _own_domain() -> int:
     return next(domain for domain in mine if is_free(domain))
 
 
+use_one_thread()
 os.environ["ROS_DOMAIN_ID"] = str(_own_domain())
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 os.environ["ROS_PYTHON_CHECK_FIELDS"] = "1"  # real rclpy checks no field types by default

@@ -18,6 +18,7 @@ from collections.abc import Sequence
 from types import ModuleType
 
 from ccr_ros import __version__
+from ccr_ros.blas import use_one_thread
 from ccr_ros.model.errors import CcrError
 
 COMMANDS: dict[str, tuple[str, str]] = {
@@ -51,6 +52,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         argv: Arguments after the program's name; ``None`` takes them from ``sys.argv``.
     """
     words = list(sys.argv[1:] if argv is None else argv)
+    use_one_thread()
     if argv is None and words[:1] == ["run"]:
         from ccr_ros.nodes.entry import end_on_signals
 
