@@ -26,7 +26,8 @@ CYCLONE_WHEELS = (
 FEATURES = {
     "plot": ["matplotlib>=3.8,<4"],
     "record": ["mcap>=1.2,<2"],
-    "design": ["scipy>=1.11,<2", "manifold3d>=3.1,<4"],  # curves through points; solids to print
+    "design": ["scipy>=1.11,<2"],
+    "print": ["manifold3d>=3.1,<4", "trimesh>=4.5,<6"],
     "bench": ["scipy>=1.11,<2"],
 }
 
