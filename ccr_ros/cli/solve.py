@@ -91,17 +91,26 @@ def parse_pulls(
             raise UnknownName("cable", cable, cables)
         if cable in pulls:
             raise InvalidValue(f"--pull {cable}", word, "given once per cable")
-        percent = text.endswith("%")
-        try:
-            value = float(text.removesuffix("%"))
-        except ValueError:
-            value = float("nan")
-        if not np.isfinite(value):
-            allowed = "a finite number of metres (0.007), or a percentage (4%)"
-            raise InvalidValue(f"--pull {cable}", text, allowed)
+        value, relative = parse_pull(f"--pull {cable}", text)
         length = float(rest_lengths[cables.index(cable)])
-        pulls[cable] = value / 100 * length if percent else value
+        pulls[cable] = value * length if relative else value
     return pulls
+
+
+def parse_pull(place: str, text: str) -> tuple[float, bool]:
+    """Return the value of ``4%`` (0.04 and True: of the rest length) or ``0.007`` (m, and False).
+
+    Raises:
+        InvalidValue: It is neither; the error is located at ``place``.
+    """
+    percent = text.endswith("%")
+    try:
+        value = float(text.removesuffix("%"))
+    except ValueError:
+        value = float("nan")
+    if not np.isfinite(value):
+        raise InvalidValue(place, text, "a finite number of metres (0.007), or a percentage (4%)")
+    return (value / 100 if percent else value), percent
 
 
 def _count(option: str, text: str, high: int) -> int:

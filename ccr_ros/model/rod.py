@@ -53,7 +53,7 @@ def _arms() -> np.ndarray:
 _ARMS = _arms()
 
 
-class _Arc:
+class Arc:
     """Rotation and translation along one arc as functions of z = (h a, h b) or (h a).
 
     All is written in x = (w, v) of the Magnus expansion, in which derivatives are short, and taken
@@ -119,7 +119,7 @@ class _Arc:
         return ca.cse(ca.substitute(expression, self.x, self.x_of_z))
 
 
-class _Buffered:
+class Buffered:
     """A CasADi function called through its C buffers: no conversions, no allocation."""
 
     def __init__(self, function: ca.Function) -> None:
@@ -139,7 +139,7 @@ class _Buffered:
 @lru_cache(maxsize=32)
 def _functions(arcs: int, order: int) -> tuple[ca.Function, ca.Function]:
     """The chain of arcs with its twists, and the arcs' contracted second derivatives."""
-    arc, state = _Arc(order, 1.0 / arcs), ca.SX.sym("state", 12)
+    arc, state = Arc(order, 1.0 / arcs), ca.SX.sym("state", 12)
     z = arc.z
     r0, p0 = ca.reshape(state[:9], 3, 3), state[9:]
     # The rotation's derivative is the angular velocity J dw, in the frame of the arc's start.
@@ -184,7 +184,7 @@ class Rod:
         self.order = order
         self.size = 3 * (order + 1)
         chain, second = _functions(arcs, order)
-        self._chain, self._second = _Buffered(chain), _Buffered(second)
+        self._chain, self._second = Buffered(chain), Buffered(second)
         self._chain.inputs[0][:] = [1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0]
         # arc index of each coordinate: the upper triangle of pairs of coordinates of unlike arcs
         arc = np.repeat(np.arange(arcs), self.size)

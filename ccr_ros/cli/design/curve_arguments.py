@@ -16,12 +16,12 @@ from ccr_ros.model import Finger
 CURVES_HELP = "\n".join(f"  {form}" for form in ("points.csv", *FAMILIES.values()))
 
 
-def add_curve_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare ``--curve`` and ``--unit``."""
+def add_curve_arguments(parser: argparse.ArgumentParser, required: bool = True) -> None:
+    """Declare ``--curve``, which must be given unless told otherwise, and ``--unit``."""
     parser.add_argument(
         "--curve",
         metavar="CURVE",
-        required=True,
+        required=required,
         help="the wanted backbone curve, in the frame of the finger's base: a CSV file of points"
         f" (x, y, z), or one of {', '.join(FAMILIES.values())}; lengths in m, angles in degrees",
     )
