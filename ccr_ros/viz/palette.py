@@ -7,6 +7,7 @@ from __future__ import annotations
 PALETTE = ("#2f7de1", "#12a06e", "#d98a00", "#8b5cf6", "#0aa5c2", "#d6569f", "#7a9e1f", "#a8714a")
 CONTACT = "#d92d3a"
 REST = "#9aa3af"
+WANTED = "#e255b5"
 BACKBONE = "#2b3442"
 DISK = "#8d99aa"
 OBSTACLE = "#8fa0b8"

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -49,21 +50,44 @@ def plot_solution(solution: Solution, path: str | Path, *, rest: Solution | None
 def figure_of_solution(solution: Solution, *, rest: Solution | None = None) -> Figure:
     """Return the figure that `plot_solution` writes; axes "3-D", "x-z" and "y-z" (their labels)."""
     figure = new_figure(14.0, 6.8)
+    grid = figure.add_gridspec(
+        1, 3, width_ratios=(1.3, 1, 1), left=0.01, right=0.985, top=0.84, bottom=0.145, wspace=0.2
+    )
+    views = draw_views(figure, [grid[0, i] for i in range(3)], solution, rest=rest)
+    draw_title(figure, solution)
+    draw_legend(figure, views[1])
+    return figure
+
+
+def draw_views(
+    figure: Figure,
+    cells: Sequence[Any],
+    solution: Solution,
+    *,
+    rest: Solution | None = None,
+    also: Sequence[np.ndarray] = (),
+) -> list[Any]:
+    """Draw a solution's three views into three cells of a grid, and return their axes.
+
+    Args:
+        figure: The figure.
+        cells: Cells of one of its grids: of the 3-D view, of x-z and of y-z.
+        solution: The pose.
+        rest: The pose without pulls and obstacles, drawn in grey.
+        also: Further points (k, 3) [m] that the views must show; not drawn here.
+    """
     finger = solution.finger
-    length = finger.length
     bodies = [
-        obstacle_surface(o, solution.backbone.mean(axis=0), 0.9 * length) for o in finger.obstacles
+        obstacle_surface(o, solution.backbone.mean(axis=0), 0.9 * finger.length)
+        for o in finger.obstacles
     ]
     arrows = _arrows(solution)
-    held = [solution.centerline, *_disks(solution), *arrows]
+    held = [solution.centerline, *_disks(solution), *arrows, *also]
     held += [rest.centerline] if rest is not None else []
     held += [b.vertices for b in bodies]
     points = np.vstack(held)
 
-    grid = figure.add_gridspec(
-        1, 3, width_ratios=(1.3, 1, 1), left=0.01, right=0.985, top=0.84, bottom=0.145, wspace=0.2
-    )
-    space = figure.add_subplot(grid[0, 0], projection="3d", label="3-D", computed_zorder=False)
+    space = figure.add_subplot(cells[0], projection="3d", label="3-D", computed_zorder=False)
     for body in bodies:
         draw_surface(space, body)
     _draw_pose(space, solution, rest, (0, 1, 2), arrows)
@@ -76,8 +100,9 @@ def figure_of_solution(solution: Solution, *, rest: Solution | None = None) -> F
 
     low, high = points.min(axis=0) * MM, points.max(axis=0) * MM
     half = max((high - low)[:2].max() / 2, 0.28 * (high - low)[2]) * 1.06
-    for column, (a, b) in enumerate(_SIDES, start=1):
-        side = figure.add_subplot(grid[0, column], label=f"{_NAMES[a]}-{_NAMES[b]}")
+    views = [space]
+    for cell, (a, b) in zip(cells[1:], _SIDES, strict=True):
+        side = figure.add_subplot(cell, label=f"{_NAMES[a]}-{_NAMES[b]}")
         for body in bodies:
             _draw_outline(side, body, (a, b))
         _draw_pose(side, solution, rest, (a, b), arrows)
@@ -88,14 +113,18 @@ def figure_of_solution(solution: Solution, *, rest: Solution | None = None) -> F
         side.set_ylim(low[2] - pad, high[2] + pad)
         side.set_xlabel(f"{_NAMES[a]} [mm]", fontsize=9)
         side.set_ylabel(f"{_NAMES[b]} [mm]", fontsize=9)
-        side.grid(color="#e3e7ee", linewidth=0.7)
-        side.set_axisbelow(True)
-        side.tick_params(labelsize=8, colors="#4a5568")
-        for edge in side.spines.values():
-            edge.set_color("#c5ccd6")
-    _title(figure, solution)
-    _legend(figure, figure.axes[1])
-    return figure
+        plain_2d(side)
+        views.append(side)
+    return views
+
+
+def plain_2d(axes: Any) -> None:
+    """Quieten the grid, the ticks and the frame of flat axes."""
+    axes.grid(color="#e3e7ee", linewidth=0.7)
+    axes.set_axisbelow(True)
+    axes.tick_params(labelsize=8, colors="#4a5568")
+    for edge in axes.spines.values():
+        edge.set_color("#c5ccd6")
 
 
 def _draw_pose(
@@ -202,7 +231,8 @@ def _draw_outline(axes: Any, body: Surface, keep: tuple[int, int]) -> None:
     axes.add_patch(Polygon(corners, closed=True, facecolor="#dfe5ee", **style))
 
 
-def _title(figure: Figure, solution: Solution) -> None:
+def draw_title(figure: Figure, solution: Solution) -> None:
+    """Write the finger's name, its pulls, and whether the pose is to be trusted."""
     finger, c = solution.finger, solution.certificate
     pulls = ", ".join(
         f"{name} {pull * MM:.3g} mm"
@@ -220,7 +250,8 @@ def _title(figure: Figure, solution: Solution) -> None:
     )
 
 
-def _legend(figure: Figure, axes: Any) -> None:
+def draw_legend(figure: Figure, axes: Any) -> None:
+    """Write the legend of one view below all of them."""
     handles, labels = axes.get_legend_handles_labels()
     figure.legend(
         handles, labels, loc="lower center", ncols=min(5, len(labels)), fontsize=9, frameon=False,
