@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Derivatives of a pose with respect to cable pulls, by the implicit function theorem.
+"""Derivatives of a pose with respect to what drives the cables, by the implicit function theorem.
 
-With the active constraints A y' = b' of the KKT system,
+A cable is driven by its pull as long as it is taut; one that is slack answers to a tension only.
+With the taut cables' lengths and the contacts as active constraints A y' = b' of the KKT system,
 
-    [H  A'] [dy]   [ 0]
-    [A  0 ] [dm] = [db],      db = -dpull / L for a taut cable, 0 for a contact.
+    [H  A'] [dy]   [-A_s' dT_s]
+    [A  0 ] [dm] = [    db    ],    db = -dpull / L for a taut cable, 0 for a contact,
+
+where A_s are the gradients of the slack cables' lengths and dT_s >= 0 their new tensions.
 """
 
 from __future__ import annotations
@@ -24,40 +27,103 @@ class Sensitivity:
     Attributes:
         tip: (6, m) of the tip disk in the base frame: position [m/m], then rotation vector [rad/m].
         disks: (n+1, 3, m) of the disk centres [m/m].
+        turns: (n+1, 3, m) of the disks' rotation vectors in the base frame [rad/m].
         tensions: (m, m) of the tensions [N/m, or per EI].
+        contacts: (k, m) of the contacts' forces, in the order of `Solution.contacts` [N/m, or per
+            EI].
     """
 
     tip: np.ndarray
     disks: np.ndarray
+    turns: np.ndarray
     tensions: np.ndarray
+    contacts: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """How a pose answers to its m cables, in the solver's units (L, and EI / L^2).
+
+    Column c is per unit of pull of cable c where that is taut, else per unit of its tension.
+
+    Attributes:
+        y: (N, m) of the scaled coordinates.
+        tensions: (C, m) of the tensions; one for each cable, or for each span.
+        forces: (k, m) of the forces on the active pairs of obstacle and point.
+        pairs: (k,) indices of these in ``KktPoint.pairs``.
+    """
+
+    y: np.ndarray
+    tensions: np.ndarray
+    forces: np.ndarray
+    pairs: np.ndarray
+
+
+def response(problem: EquilibriumProblem, point: KktPoint, taut: np.ndarray) -> Response:
+    """Return the response at a converged point.
+
+    Args:
+        taut: (m,) bool, the cables that are driven by their pull; in the frictionless cable model
+            the others by a tension, else not at all.
+    """
+    count, groups, n = len(problem.finger.cables), len(point.tensions), problem.size
+    zero = problem.length_bounds(np.zeros(count))
+    # The bounds are linear in the pulls: their derivative, per L.
+    pulled = np.diag(taut * problem.finger.length)
+    bound = np.column_stack([problem.length_bounds(unit) - zero for unit in pulled])
+    active = np.flatnonzero(point.active)
+    rows, k = point.rows[active], len(active)
+    lengths = active < groups
+    system = np.zeros((n + k, n + k))
+    system[:n, :n], system[:n, n:], system[n:, :n] = point.hessian, rows.T, rows
+    right = np.zeros((n + k, count))
+    right[n:][lengths] = bound[active[lengths]]
+    slack = np.flatnonzero(~taut) if groups == count else np.zeros(0, dtype=int)
+    right[:n, slack] = -point.rows[slack].T
+    try:
+        solved = np.linalg.solve(system, right)
+    except np.linalg.LinAlgError:  # twin constraints: the least-norm multipliers
+        solved = np.linalg.lstsq(system, right, rcond=None)[0]
+    tensions = np.zeros((groups, count))
+    tensions[active[lengths]] = solved[n:][lengths]
+    tensions[slack, slack] += 1.0
+    return Response(solved[:n], tensions, solved[n:][~lengths], active[~lengths] - groups)
+
+
+def turns(problem: EquilibriumProblem, point: KktPoint, dy: np.ndarray) -> np.ndarray:
+    """Return the disks' rotation vectors (n+1, 3, m) for changes dy (N, m) of the coordinates."""
+    per_arc = point.first.twists[:, :3, None] * dy[:, None, :]
+    per_arc = per_arc.reshape(problem.finger.segments, -1, 3, dy.shape[1]).sum(axis=1)
+    return np.concatenate([np.zeros((1, 3, dy.shape[1])), np.cumsum(per_arc, axis=0)])
 
 
 def sensitivity(problem: EquilibriumProblem, point: KktPoint) -> Sensitivity:
     """Return the derivatives at a converged point."""
     finger = problem.finger
     count = len(finger.cables)
-    zero = problem.length_bounds(np.zeros(count))
-    # The bounds are linear in the pulls: their derivative, per metre.
-    bound = np.column_stack([problem.length_bounds(unit) - zero for unit in np.eye(count)])
-    active = np.flatnonzero(point.active)
-    groups = len(point.tensions)
-    rows, n, k = point.rows[active], problem.size, len(active)
-    system = np.zeros((n + k, n + k))
-    system[:n, :n], system[:n, n:], system[n:, :n] = point.hessian, rows.T, rows
-    right = np.zeros((n + k, count))
-    taut = active < groups
-    right[n:][taut] = bound[active[taut]]
-    try:
-        solved = np.linalg.solve(system, right)
-    except np.linalg.LinAlgError:  # twin constraints: the least-norm multipliers
-        solved = np.linalg.lstsq(system, right, rcond=None)[0]
-    dy = solved[:n]
+    taut = np.zeros(count, dtype=bool)
+    taut[problem.group_cable[point.active[: len(point.tensions)]]] = True
+    answer = response(problem, point, taut)
+    dy = np.where(taut, answer.y, 0.0) / finger.length
     disks = (point.first.points[problem.points.backbone] @ dy) * finger.length
-    turn = point.first.twists[:, :3].T @ dy
-    tensions = np.zeros((groups, count))
-    tensions[active[taut]] = solved[n:][taut]
+    turn = turns(problem, point, dy)
+    unit = finger.bending_stiffness / finger.length**3
+    order = contact_order(problem, point, answer.pairs)
     return Sensitivity(
-        tip=np.concatenate([disks[-1], turn]),
+        tip=np.concatenate([disks[-1], turn[-1]]),
         disks=disks,
-        tensions=tensions[problem.base_group] * finger.bending_stiffness / finger.length**2,
+        turns=turn,
+        tensions=np.where(taut, answer.tensions, 0.0)[problem.base_group] * unit,
+        contacts=np.where(taut, answer.forces, 0.0)[order] * unit,
     )
+
+
+def contact_order(problem: EquilibriumProblem, point: KktPoint, pairs: np.ndarray) -> list[int]:
+    """Return the places, among active ``pairs``, of the contacts in the order of a `Solution`."""
+
+    def key(i: int) -> tuple[int, str, str]:
+        obstacle, index = point.pairs[pairs[i]]
+        label = problem.points.labels[index]
+        return label.disk, problem.obstacles[obstacle].name, label.point
+
+    return sorted(range(len(pairs)), key=key)

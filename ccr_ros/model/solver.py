@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,6 +21,27 @@ from .sqp import Bounds, KktPoint, derive, solve_sqp
 
 _SMALLEST_STEP = 1.0 / 512  # of the way to the target
 _NUDGE = 3e-2  # departure from a saddle, in the coordinates of which energy is 1/2 y.y
+
+
+@dataclass(frozen=True)
+class Move:
+    """How a `FingerSolver.move` ended: converged or not, with a jump, or where disks would meet."""
+
+    converged: bool
+    jumped: bool
+    met: tuple[int, int] | None
+
+
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """Where a `FingerSolver` stands (see `FingerSolver.standing`); nothing in it ever changes."""
+
+    of: FingerSolver
+    obstacles: tuple[Obstacle, ...]
+    point: KktPoint
+    pulls: np.ndarray
+    obstacles_changed: bool
+    solved: bool
 
 
 class FingerSolver:
@@ -99,6 +120,33 @@ class FingerSolver:
             InvalidValue, UnknownName: Bad pulls; nothing has moved.
         """
         begin = time.perf_counter()
+        target = self._checked(pulls)
+        walk = self._walk(self._point, self._pulls, target)
+        if walk.reached is not None and self.obstacles and np.any(self._point.at.y):
+            # Stuck: an obstacle that came where the finger stands, say. From rest there may be a
+            # way round it, which is a jump from where the finger was.
+            again = self._walk(self._at_rest(), np.zeros_like(target), target)
+            again.iterations += walk.iterations
+            if again.reached is None:
+                again.jumped = True
+                walk = again
+        self._take(walk, target)
+        return make_solution(
+            self.problem, target, walk, elapsed=lambda: time.perf_counter() - begin
+        )
+
+    def move(self, pulls: Mapping[str, float] | Sequence[float] | np.ndarray) -> Move:
+        """Solve on the branch that the finger is on, without a `Solution`, which costs extra.
+
+        Raises:
+            InvalidValue, UnknownName: As for `solve`.
+        """
+        target = self._checked(pulls)
+        walk = self._walk(self._point, self._pulls, target)
+        self._take(walk, target)
+        return Move(walk.reached is None, walk.jumped, walk.met)
+
+    def _checked(self, pulls: Mapping[str, float] | Sequence[float] | np.ndarray) -> np.ndarray:
         target = self.finger.pulls_array(pulls)
         for name, pull, rest in zip(
             self.finger.cable_names, target, self.rest_lengths, strict=True
@@ -109,21 +157,12 @@ class FingerSolver:
                     float(pull),
                     f"less than the cable's length inside the finger, {rest:.6g} m",
                 )
-        walk = self._walk(self._point, self._pulls, target)
-        if walk.reached is not None and self.obstacles and np.any(self._point.at.y):
-            # Stuck: an obstacle that came where the finger stands, say. From rest there may be a
-            # way round it, which is a jump from where the finger was.
-            again = self._walk(self._at_rest(), np.zeros_like(target), target)
-            again.iterations += walk.iterations
-            if again.reached is None:
-                again.jumped = True
-                walk = again
+        return target
+
+    def _take(self, walk: _Walk, target: np.ndarray) -> None:
         if walk.reached is None:
             self._point, self._pulls = walk.point, target
             self._obstacles_changed, self._solved = False, True
-        return make_solution(
-            self.problem, target, walk, elapsed=lambda: time.perf_counter() - begin
-        )
 
     def sensitivity(self) -> Sensitivity:
         """Return the derivatives of the last converged pose with respect to the pulls.
@@ -134,6 +173,32 @@ class FingerSolver:
         if not self._solved:
             raise InvalidValue("sensitivity", None, "asked for after a converged solve")
         return sensitivity(self.problem, self._point)
+
+    @property
+    def standing(self) -> Standing:
+        """Where the solver stands; a solver of the same finger can `resume` from it."""
+        return Standing(
+            self, self.obstacles, self._point, self._pulls, self._obstacles_changed, self._solved
+        )
+
+    def resume(self, standing: Standing) -> None:
+        """Go back, or over, to where a solver of the same finger and settings stood.
+
+        Raises:
+            InvalidValue: It is of another finger, or of one that is discretised otherwise.
+        """
+        other, mine = standing.of.problem, self.problem
+        same = other.settings.cable_model == mine.settings.cable_model
+        if (
+            other.finger is not self.finger
+            or other.rod.order != mine.rod.order
+            or not (same and other.arcs == mine.arcs)
+        ):
+            allowed = f"of a solver of finger {self.finger.name!r} itself, with the same settings"
+            raise InvalidValue("standing", other.finger.name, allowed)
+        self.problem.obstacles = standing.obstacles
+        self._point, self._pulls = standing.point, standing.pulls
+        self._obstacles_changed, self._solved = standing.obstacles_changed, standing.solved
 
     def _walk(self, point: KktPoint, pulls: np.ndarray, target: np.ndarray) -> _Walk:
         """Walk from a point under pulls to the target; each walk has the time limit to itself."""

@@ -163,6 +163,14 @@ def test_sensitivities(name: str, pulls: list[float], model: str) -> None:
         assert found.tip[3:, j] == pytest.approx(spin, abs=1e-3)
         slope = (high.tensions - low.tensions) / (2 * step)
         assert found.tensions[:, j] == pytest.approx(slope, rel=1e-4, abs=1e-3)
+        turns = (high.frames - low.frames) / (2 * step) @ middle.frames.transpose(0, 2, 1)
+        spins = np.stack([turns[:, 2, 1], turns[:, 0, 2], turns[:, 1, 0]], axis=1)
+        assert found.turns[:, :, j] == pytest.approx(spins, abs=1e-3)
+        forces = [[c.force for c in side.contacts] for side in sides]
+        slope = (np.array(forces[0]) - forces[1]) / (2 * step)
+        assert found.contacts[:, j] == pytest.approx(slope, rel=1e-4, abs=1e-3)
+    assert len(found.contacts) == len(middle.contacts)
+    assert bool(middle.contacts) == (name == "contact_cylinder")
 
 
 def test_sensitivity_of_a_slack_cable_is_nothing() -> None:
