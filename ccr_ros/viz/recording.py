@@ -135,6 +135,7 @@ class FingerFrame:
         contacts: The active contacts.
         converged, stable: What the solver's certificate says.
         stale: The pose is older than the pulls: it is the last good one.
+        servo_angles: (m,) angle of each cable's servo [rad]; ``None``: not known.
     """
 
     pulls: np.ndarray
@@ -146,6 +147,7 @@ class FingerFrame:
     converged: bool = True
     stable: bool = True
     stale: bool = False
+    servo_angles: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         pulls = array("pulls", self.pulls, (None,), "m")
@@ -169,6 +171,8 @@ class FingerFrame:
         )
         values = {"pulls": pulls, "tensions": tensions, "backbone": backbone, "orientations": turns}
         values |= {"cables": MappingProxyType(cables), "contacts": contacts}
+        if self.servo_angles is not None:
+            values["servo_angles"] = array("servo_angles", self.servo_angles, (len(pulls),), "rad")
         for key, value in values.items():
             object.__setattr__(self, key, value)
 
@@ -181,15 +185,19 @@ class Frame:
         time: Since the start of the recording [s].
         fingers: By name; a finger that had not been heard of yet is absent.
         objects: Pose of each object present, by name; ``None``: all, at their recorded poses.
+        phase: What the gripper is doing, in a word or two; empty: not known.
     """
 
     time: float
     fingers: Mapping[str, FingerFrame]
     objects: Mapping[str, Pose] | None = None
+    phase: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "time", checks.real("time", self.time, low=0, unit="s"))
         object.__setattr__(self, "fingers", MappingProxyType(dict(self.fingers)))
+        if not isinstance(self.phase, str):
+            raise InvalidValue("phase", self.phase, "a text")
         if self.objects is not None:
             object.__setattr__(self, "objects", MappingProxyType(dict(self.objects)))
 
@@ -264,6 +272,15 @@ class Recording:
     def duration(self) -> float:
         """Time of the last frame [s]."""
         return self.frames[-1].time
+
+    @property
+    def phases(self) -> tuple[tuple[float, str], ...]:
+        """Phases in turn, each with the time [s] it begins at; empty where none is known."""
+        found: list[tuple[float, str]] = []
+        for frame in self.frames:
+            if frame.phase != (found[-1][1] if found else ""):
+                found.append((frame.time, frame.phase))
+        return tuple(found)
 
     def finger(self, name: str) -> RecordedFinger:
         """Return the finger of that name.

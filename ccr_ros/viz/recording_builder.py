@@ -44,6 +44,7 @@ class RecordingBuilder:
         self._present: dict[str, Pose] = {}
         self._frames: list[Frame] = []
         self._start: float | None = None
+        self._phase = ""
         self.set_objects(objects)
 
     @classmethod
@@ -96,13 +97,14 @@ class RecordingBuilder:
         converged: bool | None = None,
         stable: bool | None = None,
         stale: bool | None = None,
+        servo_angles: Sequence[float] | np.ndarray | None = None,
     ) -> None:
         """Note what has arrived about a finger; what is not given keeps its last value.
 
         Args:
             finger: Its name.
-            pulls, tensions, backbone, orientations, contacts, converged, stable, stale: As in
-                `FingerFrame`, in the finger's base frame.
+            pulls, tensions, backbone, orientations, contacts, converged, stable, stale,
+                servo_angles: As in `FingerFrame`, in the finger's base frame.
             cables: Points of one or more cables by name; the others keep theirs.
 
         Raises:
@@ -119,6 +121,7 @@ class RecordingBuilder:
             "converged": converged,
             "stable": stable,
             "stale": stale,
+            "servo_angles": servo_angles,
         }
         with self._lock:
             latest = self._latest[finger]
@@ -157,6 +160,11 @@ class RecordingBuilder:
                     )
             self._present = {o.name: o.pose for o in objects}
 
+    def set_phase(self, phase: str) -> None:
+        """Note what the gripper is doing from now on, in a word or two."""
+        with self._lock:
+            self._phase = phase
+
     def sample(self, time: float) -> None:
         """Take the latest values as the frame of ``time`` [s], counted from any origin.
 
@@ -167,12 +175,12 @@ class RecordingBuilder:
         """
         with self._lock:
             latest = {name: dict(v) for name, v in self._latest.items()}
-            present = dict(self._present)
+            present, phase = dict(self._present), self._phase
         start = time if self._start is None else self._start
         if self._frames and time - start <= self._frames[-1].time:
             return
         fingers = {n: FingerFrame(**v) for n, v in latest.items() if all(k in v for k in _NEEDED)}
-        self._frames.append(Frame(time - start, fingers, present))
+        self._frames.append(Frame(time - start, fingers, present, phase))
         self._start = start
 
     def build(self) -> Recording:

@@ -134,11 +134,13 @@ def _frame(frame: Frame) -> dict[str, Any]:
     }
     if frame.objects is not None:
         out["objects"] = {name: _pose(pose) for name, pose in frame.objects.items()}
+    if frame.phase:
+        out["phase"] = frame.phase
     return out
 
 
 def _finger_frame(finger: FingerFrame) -> dict[str, Any]:
-    return {
+    out = {
         "pulls": _round(finger.pulls),
         "tensions": [_significant(t) for t in finger.tensions.tolist()],
         "backbone": _round(finger.backbone),
@@ -160,6 +162,9 @@ def _finger_frame(finger: FingerFrame) -> dict[str, Any]:
         "stable": finger.stable,
         "stale": finger.stale,
     }
+    if finger.servo_angles is not None:
+        out["servo_angles"] = _round(finger.servo_angles, 5)
+    return out
 
 
 def _get(data: Any, key: str, kind: type) -> Any:
@@ -223,7 +228,7 @@ def _read_frame(data: Any) -> Frame:
     objects = None
     if "objects" in data:
         objects = {name: _read_pose(pose) for name, pose in _get(data, "objects", dict).items()}
-    return Frame(data.get("time"), fingers, objects)
+    return Frame(data.get("time"), fingers, objects, data.get("phase", ""))
 
 
 def _read_finger_frame(data: Any) -> FingerFrame:
@@ -237,6 +242,7 @@ def _read_finger_frame(data: Any) -> FingerFrame:
         converged=_get(data, "converged", bool),
         stable=_get(data, "stable", bool),
         stale=_get(data, "stale", bool),
+        servo_angles=data.get("servo_angles"),
     )
 
 

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A recording as one picture: the gripper at some moments, and pulls and tensions over time."""
+"""A recording as one picture: the gripper at some moments, and its measurements over time."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,7 +13,7 @@ import numpy as np
 
 from ..model import checks
 from .figures import MM, checked_path, force_unit, new_figure, save
-from .recording import Frame, Recording
+from .recording import FingerFrame, Frame, Recording
 from .sketch import View, bounds, cable_color, draw_moment, draw_plate
 
 if TYPE_CHECKING:
@@ -57,7 +59,11 @@ def moments(recording: Recording, count: int) -> tuple[int, ...]:
 
 
 def figure_of_recording(recording: Recording, count: int = 5) -> Figure:
-    """Return the figure that `write_strip` writes; axes "t=...", then axes "tension" and "pull"."""
+    """Return the figure that `write_strip` writes.
+
+    Its axes are labelled "t=...", then "tension", "force" (where there is contact), "pull" and
+    "servo" (where servo angles are known).
+    """
     shown = moments(recording, count)
     view = View()
     low, high = bounds(recording, view)
@@ -65,11 +71,12 @@ def figure_of_recording(recording: Recording, count: int = 5) -> Figure:
     width = max(10.0, 2.9 * len(shown))
     panel = 0.925 * width / len(shown) * half[1] / half[0]
     panel = min(max(panel, 2.0), 5.0)
-    height = panel + 4.9
+    curves = _panels(recording)
+    height = panel + 1.9 + 1.5 * len(curves)
     figure = new_figure(width, height)
     grid = figure.add_gridspec(
-        3, len(shown), height_ratios=(panel, 1.5, 1.5), left=0.06, right=0.985,
-        top=1 - 0.95 / height, bottom=0.85 / height, hspace=0.1, wspace=0.0,
+        1 + len(curves), len(shown), height_ratios=(panel, *(1.5 for _ in curves)), left=0.06,
+        right=0.985, top=1 - 0.95 / height, bottom=0.85 / height, hspace=0.1, wspace=0.0,
     )  # fmt: skip
     figure.text(
         0.15 / width,
@@ -89,14 +96,15 @@ def figure_of_recording(recording: Recording, count: int = 5) -> Figure:
         axes.set_ylim(middle[1] - half[1], middle[1] + half[1])
         axes.set_axis_off()
         axes.set_title(f"{frame.time:.1f} s\n{_state(frame)}", fontsize=10, color="#18212e")
-    unit = force_unit(recording.forces_are)
-    tension = figure.add_subplot(grid[1, :], label="tension")
-    _curves(tension, recording, shown, lambda f, j: float(f.tensions[j]), f"tension [{unit}]")
-    pull = figure.add_subplot(grid[2, :], label="pull", sharex=tension)
-    _curves(pull, recording, shown, lambda f, j: float(f.pulls[j]) * MM, "pull [mm]")
-    pull.set_xlabel("time [s]", fontsize=9)
-    tension.tick_params(labelbottom=False)
-    handles, labels = tension.get_legend_handles_labels()
+    first: Any = None
+    for row, (label, title, value) in enumerate(curves, 1):
+        axes = figure.add_subplot(grid[row, :], label=label, sharex=first)
+        _curves(axes, recording, shown, value, title, per_cable=label != "force")
+        axes.tick_params(labelbottom=row == len(curves))
+        first = first or axes
+    axes.set_xlabel("time [s]", fontsize=9)
+    _name_phases(first, recording)
+    handles, labels = first.get_legend_handles_labels()
     figure.legend(
         handles, labels, loc="lower center", ncols=min(6, len(labels)), fontsize=9, frameon=False
     )
@@ -117,23 +125,66 @@ def _state(frame: Frame) -> str:
     return ", ".join(words)
 
 
+_Value = Callable[[FingerFrame, int], "float | None"]
+
+
+def _panels(recording: Recording) -> list[tuple[str, str, _Value]]:
+    """What is drawn over time: label, title, and the value of a finger's cable in a frame."""
+    unit = force_unit(recording.forces_are)
+    moments = [f for frame in recording.frames for f in frame.fingers.values()]
+    panels: list[tuple[str, str, _Value]] = [
+        ("tension", f"tension [{unit}]", lambda f, j: float(f.tensions[j]))
+    ]
+    if any(f.contacts for f in moments):
+        title = f"contact force\nper finger [{unit}]"
+        panels.append(("force", title, lambda f, _: sum(c.force for c in f.contacts)))
+    panels.append(("pull", "pull [mm]", lambda f, j: float(f.pulls[j]) * MM))
+    if any(f.servo_angles is not None for f in moments):
+        panels.append(("servo", "servo [deg]", _servo_degrees))
+    return panels
+
+
+def _servo_degrees(frame: FingerFrame, cable: int) -> float | None:
+    angles = frame.servo_angles
+    return None if angles is None else math.degrees(angles[cable])
+
+
+def _name_phases(axes: Any, recording: Recording) -> None:
+    """Write what the gripper is doing above the curves, where there is room for it."""
+    begun = [*recording.phases, (recording.duration, "")]
+    for (time, phase), (end, _) in pairwise(begun):
+        if end - time > 0.011 * len(phase) * recording.duration:
+            axes.annotate(
+                phase, (time, 1.0), xycoords=("data", "axes fraction"), xytext=(3, 2),
+                textcoords="offset points", fontsize=8, color="#4a5568",
+            )  # fmt: skip
+
+
 def _curves(
-    axes: Any, recording: Recording, shown: tuple[int, ...], value: Any, label: str
+    axes: Any,
+    recording: Recording,
+    shown: tuple[int, ...],
+    value: _Value,
+    label: str,
+    per_cable: bool,
 ) -> None:
     fingers, last = recording.fingers, len(recording.fingers) - 1
     for k, finger in enumerate(fingers):
         frames = [f for f in recording.frames if finger.name in f.fingers]
         times = [f.time for f in frames]
-        for j, cable in enumerate(finger.cables):
+        for j, cable in enumerate(finger.cables if per_cable else finger.cables[:1]):
+            values = [value(f.fingers[finger.name], j) for f in frames]
             axes.plot(
                 times,
-                [value(f.fingers[finger.name], j) for f in frames],
+                [math.nan if v is None else v for v in values],
                 color=cable_color(k, j, len(fingers)),
                 ls=_DASHES[j % len(_DASHES)] if last else "-",
                 # Fingers often do the same: the first drawn are the widest, so that all show.
                 lw=1.2 + (1.6 * (last - k) if last < 4 else 0),
                 label=f"{finger.name} {cable}",
             )
+    for time, _ in recording.phases[1:]:
+        axes.axvline(time, color="#4a5568", lw=0.7, alpha=0.35)
     for index in shown:
         axes.axvline(
             recording.frames[index].time, color="#18212e", lw=0.8, ls=(0, (2, 2)), alpha=0.5

@@ -15,6 +15,14 @@ from ccr_ros.viz.recording import RecordedFinger, Recording, SolidObject
 from ccr_ros.viz.recording_builder import RecordingBuilder
 
 LENGTH, RADIUS, SEGMENTS = 0.182, 0.008, 9
+SPOOL = 0.01  # m, radius
+PHASES = (
+    (0.08, "ready"),
+    (0.42, "closing"),
+    (0.62, "holding"),
+    (0.94, "releasing"),
+    (1.0, "open"),
+)
 BALL = Sphere(np.array([0.0, 0.0, 0.110]), 0.056, name="ball")
 
 
@@ -156,5 +164,7 @@ def recording(
                 closing_at(t - late, duration) * (1 - 0.06 * max(0, k - 1)), of=f, contacts=contacts
             )
             builder.add_solution(f.name, pose, stale=k == 2 and 0.70 < t / duration < 0.72)
+            builder.add(f.name, servo_angles=pose.pulls / SPOOL)
+        builder.set_phase(next(name for share, name in PHASES if t / duration <= share))
         builder.sample(100.0 + t)
     return builder.build()

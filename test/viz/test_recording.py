@@ -58,6 +58,14 @@ def test_round_trip_keeps_everything_to_a_micrometre() -> None:
     assert after.fingers[1].rest_lengths == before.fingers[1].rest_lengths
     assert after.objects[0].kind == "sphere" and after.objects[0].dimensions == (0.056,)
     assert len(after.frames) == 21
+    assert [name for _, name in after.phases] == [name for _, name in before.phases]
+    assert [time for time, _ in after.phases] == pytest.approx([time for time, _ in before.phases])
+    assert len(after.phases) == 5
+    assert np.allclose(
+        after.frames[9].fingers["finger_1"].servo_angles,
+        before.frames[9].fingers["finger_1"].servo_angles,
+        atol=1e-5,
+    )
     touched = 0
     for a, b in zip(after.frames, before.frames, strict=True):
         assert a.time == pytest.approx(b.time, abs=1e-6)
@@ -273,3 +281,15 @@ def test_builder_of_a_gripper() -> None:
     odd = MountedFinger(synthetic.finger("odd", youngs_modulus=None), Pose())
     with pytest.raises(InvalidValue, match="same unit"):
         RecordingBuilder.of_gripper(Gripper("g", (*mounted, odd)))
+
+
+def test_phases_and_servo_angles_may_be_absent_but_not_wrong() -> None:
+    plain = a_recording()
+    assert plain.phases == () and plain.frames[0].fingers["one"].servo_angles is None
+    text = recording_to_json(plain)
+    assert "phase" not in text and "servo" not in text
+    assert recording_from_json(text).phases == ()
+    with pytest.raises(InvalidValue, match="servo_angles"):
+        moment(servo_angles=[0.1])
+    with pytest.raises(InvalidValue, match="phase"):
+        Frame(0.0, {}, None, 3)

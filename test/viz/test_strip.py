@@ -119,3 +119,28 @@ def test_unheard_and_faded_fingers_do_not_hinder(recording) -> None:
     figure = figure_of_recording(replace(recording, frames=frames), 2)
     assert not figure.axes[0].get_lines()
     assert figure.axes[1].get_lines()
+
+
+def test_force_servo_angles_and_phases_are_drawn_where_they_are_known(recording, figure) -> None:
+    labels = [axes.get_label() for axes in figure.axes if not axes.get_label().startswith("t=")]
+    assert labels == ["tension", "force", "pull", "servo"]
+    views = {axes.get_label(): axes for axes in figure.axes}
+    servo = next(li for li in views["servo"].get_lines() if li.get_label() == "finger_1 inner")
+    angles = [f.fingers["finger_1"].servo_angles[0] for f in recording.frames]
+    np.testing.assert_allclose(servo.get_ydata(), np.degrees(angles))
+    assert {t.get_text() for t in views["tension"].texts} >= {"closing", "holding", "releasing"}
+    bare = replace(
+        recording,
+        frames=tuple(
+            replace(
+                frame,
+                phase="",
+                fingers={
+                    n: replace(f, servo_angles=None, contacts=()) for n, f in frame.fingers.items()
+                },
+            )
+            for frame in recording.frames[:3]
+        ),
+    )
+    labels = [axes.get_label() for axes in figure_of_recording(bare, 2).axes]
+    assert [name for name in labels if not name.startswith("t=")] == ["tension", "pull"]

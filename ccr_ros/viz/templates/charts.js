@@ -11,9 +11,9 @@ function ticks(low, high, count) {
 }
 
 class Chart {
-  /** series: [{finger, color, dash, values: number or null per frame}] */
-  constructor(parent, title, unitText, times, series, seek) {
-    Object.assign(this, { times, series, title, unitText });
+  /** series: [{finger, color, dash, values: number or null per frame}]; marks: [{time, text}] of phases; named: whether to write them */
+  constructor(parent, title, unitText, times, series, marks, named, seek) {
+    Object.assign(this, { times, series, title, unitText, marks, named });
     const card = document.createElement("section"), head = document.createElement("h2"), note = document.createElement("span");
     const holder = document.createElement("div");
     card.className = "card chart";
@@ -48,7 +48,7 @@ class Chart {
   layout(theme, hidden) {
     const box = this.canvas.getBoundingClientRect(), ratio = Math.min(3, window.devicePixelRatio || 1);
     for (const c of [this.canvas, this.still]) { c.width = Math.max(1, Math.round(box.width * ratio)); c.height = Math.max(1, Math.round(box.height * ratio)); }
-    Object.assign(this, { ratio, theme, hidden, top: 6, bottom: box.height - 19, right: box.width - 10 });
+    Object.assign(this, { ratio, theme, hidden, top: this.named ? 17 : 6, bottom: box.height - 19, right: box.width - 10 });
     const ctx = this.still.getContext("2d");
     ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
     ctx.font = "11px system-ui, -apple-system, 'Segoe UI', 'Liberation Sans', sans-serif";
@@ -71,6 +71,16 @@ class Chart {
       ctx.textAlign = edge ? "right" : "center";
       ctx.fillText(`${t.toFixed(columns.digits)} s`, edge ? this.right + 8 : this.x(t), this.bottom + 5);
     }
+    ctx.textAlign = "left"; ctx.textBaseline = "top"; ctx.setLineDash([3, 3]);
+    this.marks.forEach(({ time, text }, i) => {
+      const x = Math.round(this.x(time)) + 0.5, next = this.marks[i + 1];
+      ctx.strokeStyle = css(theme.text, 0.35);
+      if (i) { ctx.beginPath(); ctx.moveTo(x, this.top); ctx.lineTo(x, this.bottom); ctx.stroke(); }
+      const room = this.x(next ? next.time : this.t1) - x;
+      ctx.fillStyle = css(theme.text, 0.6);
+      if (this.named && ctx.measureText(text).width + 6 < room) ctx.fillText(text, x + 3, this.top - 15);
+    });
+    ctx.setLineDash([]);
     // Curves of several fingers often coincide: the first drawn are the widest, so that all show.
     const shown = this.series.filter((s) => !hidden.has(s.finger));
     const fingers = [...new Set(shown.map((s) => s.finger))];

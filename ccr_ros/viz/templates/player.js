@@ -24,18 +24,26 @@ const series = (value) => data.fingers.flatMap((finger, k) => finger.cables.map(
 })));
 const seek = (t) => { state.time = Math.max(times[0], Math.min(duration, t)); state.dirty = true; };
 
+const phaseOf = (frame) => frame.phase || "";
+const marks = [];
+for (const frame of data.frames) {
+  if (phaseOf(frame) !== (marks.length ? marks[marks.length - 1].text : "")) marks.push({ time: frame.time, text: phaseOf(frame) });
+}
+const addChart = (title, unit, curves) => charts.push(new Chart($("charts"), title, unit, times, curves, marks, marks.length > 1 && !charts.length, seek));
+
+const charts = [];
 const scene = new Scene($("view"), data, colorOf);
-const charts = [
-  new Chart($("charts"), "Cable tension", unitText, times, series((f, j) => f.tensions[j]), seek),
-  new Chart($("charts"), "Cable pull", "mm", times, series((f, j) => f.pulls[j] * 1e3), seek),
-];
+addChart("Cable tension", unitText, series((f, j) => f.tensions[j]));
 if (scene.maxForce > 0) {
   const force = (f) => f.contacts.reduce((sum, c) => sum + c.force, 0);
-  const perFinger = data.fingers.map((finger, k) => ({
+  addChart("Contact force", `${unitText}, sum per finger`, data.fingers.map((finger, k) => ({
     finger: finger.name, color: colorOf(k, 0), dash: [],
     values: data.frames.map((frame) => (frame.fingers[finger.name] ? force(frame.fingers[finger.name]) : null)),
-  }));
-  charts.push(new Chart($("charts"), "Contact force", `${unitText}, sum per finger`, times, perFinger, seek));
+  })));
+}
+addChart("Cable pull", "mm", series((f, j) => f.pulls[j] * 1e3));
+if (data.frames.some((frame) => Object.values(frame.fingers).some((f) => f.servo_angles))) {
+  addChart("Servo angle", "°", series((f, j) => (f.servo_angles ? f.servo_angles[j] * 180 / Math.PI : null)));
 }
 const readouts = new Readouts($("readouts"), data, unitText, colorOf, dashOf, (name) => {
   if (!hidden.delete(name)) hidden.add(name);
@@ -101,12 +109,13 @@ function paint() {
     readouts.show(data.frames[i]);
     $("scrub").value = String(i);
     $("scrub").setAttribute("aria-valuetext", `${times[i].toFixed(2)} seconds`);
-    $("clock").textContent = `${times[i].toFixed(2)} s`;
+    const phase = phaseOf(data.frames[i]);
+    $("clock").textContent = `${times[i].toFixed(2)} s${phase ? ` · ${phase}` : ""}`;
     const now = document.createElement("b"), of = document.createElement("span");
     now.textContent = times[i].toFixed(2); of.textContent = ` / ${duration.toFixed(2)} s`;
     $("time").replaceChildren(now, of);
     const touching = data.fingers.filter((f) => data.frames[i].fingers[f.name]?.contacts.length).map((f) => f.name);
-    $("view").setAttribute("aria-label", `${data.gripper} at ${times[i].toFixed(2)} s; ${touching.length ? `in contact: ${touching.join(", ")}` : "no contact"}`);
+    $("view").setAttribute("aria-label", `${data.gripper} at ${times[i].toFixed(2)} s${phase ? `, ${phase}` : ""}; ${touching.length ? `in contact: ${touching.join(", ")}` : "no contact"}`);
   }
 }
 
