@@ -33,6 +33,7 @@ from .conversions import transform_message
 from .diagnostics import FingerDiagnostics, make_status
 from .finger_channel import FingerChannel
 from .frames import FingerFrames
+from .pull_service import PullService
 from .qos import COMMAND, DIAGNOSTICS, LATCHED
 from .scene import ObjectScene
 
@@ -89,6 +90,8 @@ class SolverNode(Node):
         self._objects = ObjectScene(self._fingers, fixed.gripper_frame)
         self.create_subscription(ObjectArray, "objects", self._receive_objects, COMMAND)
 
+        self._pulls = PullService(self, self._fingers, self._wake.trigger)
+
         self._markers = self.create_publisher(MarkerArray, "markers", LATCHED)
         self._scene = SceneMarkers()
         self._marker_timer = self._make_marker_timer()
@@ -107,13 +110,18 @@ class SolverNode(Node):
     # The worker
 
     def _work(self) -> None:
-        """Take new objects in, solve one finger; come back for more when others were served."""
+        """Take new objects in, solve one finger; come back for more when others were served.
+
+        A request for pulls is worked on besides, for the time of one solve.
+        """
         message, self._objects_message = self._objects_message, None
         if message is not None:
             self._take_objects(message)
         self._solve_next()
         self._report_change()
-        if self._objects_message is not None or any(c.unsolved for c in self._fingers):
+        self._pulls.work()
+        unsolved = self._objects_message is not None or any(c.unsolved for c in self._fingers)
+        if unsolved or self._pulls.busy:
             self._wake.trigger()
 
     def _solve_next(self) -> None:

@@ -74,6 +74,21 @@ def test_topics(node, direction):
     assert found == dict(documented(direction))
 
 
+def services(node):
+    return {s.service_name: type_text(s.srv_type) for s in node.services}
+
+
+def test_services(node, probe):
+    documented = {
+        row["service"].replace("~", "/gripper/solver_node"): row["type"] for row in table("service")
+    }
+    of_every_node = {
+        name.replace("/probe/", "/solver_node/"): kind
+        for name, kind in services(probe.node).items()
+    }
+    assert documented.items() == services(node).items() - of_every_node.items()
+
+
 def parameter_names(node):
     return {p.name for p in node.get_parameters_by_prefix("").values()}
 
