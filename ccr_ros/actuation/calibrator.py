@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Finds where cables are just taut: winds one after the other until its tension rises."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+from ccr_ros.model.errors import CcrError
+
+from .axis import CableAxis
+
+
+class CalibrationFailed(CcrError):
+    """A zero could not be found; its text says of which joint, and why."""
+
+
+@dataclass(frozen=True)
+class CalibrationSettings:
+    """How zeros are looked for.
+
+    Attributes:
+        rate: At which cable is wound [m/s]; slow, so that the finger follows at rest.
+        threshold: Rise of the tension that says that the cable is taut [N].
+        slack: Cable that is paid out beyond the point where the tension stops falling [m].
+        search: Most cable that is paid out, and most that is wound [m].
+    """
+
+    rate: float = 0.004
+    threshold: float = 0.3
+    slack: float = 0.002
+    search: float = 0.03
+
+
+class _Phase(Enum):
+    UNWIND = "pay out"
+    WIND = "wind"
+    RETURN = "return"
+
+
+class Calibrator:
+    """Calibrates joints in turn.
+
+    A cable is paid out until its tension falls no more (what is left is the zero of the effort),
+    then wound until the tension has risen by the threshold. A straight line through the rise,
+    carried back to where it left the zero of the effort, gives the place where the cable became
+    taut, so that neither threshold nor stiffness shift it. The servo goes back there.
+
+    Args:
+        axes: The joints to calibrate.
+        settings: How.
+    """
+
+    def __init__(self, axes: Sequence[CableAxis], settings: CalibrationSettings) -> None:
+        self._left = list(axes)
+        self._settings = settings
+        self.zeros: dict[str, float] = {}
+        self._begin()
+
+    @property
+    def joint(self) -> str:
+        """The joint whose turn it is; empty: done."""
+        return self._left[0].joint.name if self._left else ""
+
+    @property
+    def done(self) -> bool:
+        """Whether all zeros are found."""
+        return not self._left
+
+    def step(self, dt: float) -> None:
+        """Move the joint whose turn it is for a time dt [s].
+
+        Raises:
+            CalibrationFailed: Its zero cannot be found.
+        """
+        if self.done:
+            return
+        axis = self._left[0]
+        if not math.isfinite(axis.tension):
+            raise CalibrationFailed(
+                f"{self.joint}: the tension is not known, as the servo tells no effort"
+            )
+        self._samples.append((self._wound(axis), axis.raw_tension))
+        getattr(self, f"_{self._phase.name.lower()}")(axis, self._settings.rate * dt)
+
+    def _begin(self) -> None:
+        self._phase = _Phase.UNWIND
+        self._samples: list[tuple[float, float]] = []
+        self._home = math.nan
+        if self._left:
+            self._start = self._left[0].setpoint / self._left[0].transmission.angle_per_pull
+
+    def _wound(self, axis: CableAxis) -> float:
+        """Return the length on the spool [m], from where the servo's angle is 0."""
+        return axis.angle / axis.transmission.angle_per_pull
+
+    def _move(self, axis: CableAxis, by: float) -> float:
+        """Send the servo on by a length [m] and return how far it is from where it started [m]."""
+        per_pull = axis.transmission.angle_per_pull
+        axis.wind(axis.setpoint + by * per_pull)
+        return axis.setpoint / per_pull - self._start
+
+    def _unwind(self, axis: CableAxis, by: float) -> None:
+        settings = self._settings
+        wound, tensions = np.array(self._samples).T
+        paid = (wound - wound[-1]) / settings.slack  # since then, in units of the slack
+        last, before = tensions[np.abs(paid) <= 0.25], tensions[np.abs(paid - 1.125) <= 0.125]
+        if len(before) and np.median(before) - np.median(last) < 0.1 * settings.threshold:
+            self._ground = float(np.median(last))
+            self._turn(axis, _Phase.WIND)
+        elif -self._move(axis, -by) > settings.search:
+            raise CalibrationFailed(
+                f"{self.joint}: the tension still falls after {1e3 * settings.search:g} mm were "
+                "paid out"
+            )
+
+    def _wind(self, axis: CableAxis, by: float) -> None:
+        settings = self._settings
+        if axis.tension - self._ground >= settings.threshold:
+            self._home = self._taut(np.array(self._samples)) * axis.transmission.angle_per_pull
+            self._turn(axis, _Phase.RETURN)
+        elif self._move(axis, by) > settings.search:
+            raise CalibrationFailed(
+                f"{self.joint}: no tension after {1e3 * settings.search:g} mm were wound; is the "
+                "cable broken or off its spool?"
+            )
+
+    def _return(self, axis: CableAxis, by: float) -> None:
+        per_pull = axis.transmission.angle_per_pull
+        way = (self._home - axis.setpoint) / per_pull
+        axis.wind(axis.setpoint + math.copysign(min(by, abs(way)), way) * per_pull)
+        if axis.setpoint == self._home or abs(way) < 1e-9:
+            self.zeros[self.joint] = self._home
+            del self._left[0]
+            self._begin()
+
+    def _turn(self, axis: CableAxis, phase: _Phase) -> None:
+        self._phase = phase
+        self._samples = []
+        self._start = axis.setpoint / axis.transmission.angle_per_pull
+
+    def _taut(self, samples: np.ndarray) -> float:
+        """Return the wound length [m] where the tension began to rise; samples (k, 2): m, N."""
+        wound, rise = samples[:, 0], samples[:, 1] - self._ground
+        low = np.flatnonzero(rise < 0.2 * self._settings.threshold)
+        rising = slice(low[-1] + 1 if len(low) else 0, None)
+        wound, rise = wound[rising], rise[rising]
+        if len(wound) < 2 or np.ptp(wound) < 1e-9:
+            return float(wound[0])
+        slope, _ = np.polyfit(wound, rise, 1)
+        if slope <= 0.0:
+            return float(wound[0])
+        return float(wound.mean() - rise.mean() / slope)
