@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
+from importlib import import_module
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
@@ -21,17 +22,28 @@ def end_on_signals() -> None:
 
 def solver_node() -> int:
     """Run the solver node; arguments are in ``sys.argv``. Returns the exit code."""
+    return _run("solver_node", "SolverNode")
+
+
+def servo_bridge_node() -> int:
+    """Run the servo bridge; arguments are in ``sys.argv``. Returns the exit code."""
+    return _run("servo_bridge_node", "ServoBridgeNode")
+
+
+def _run(module: str, node: str) -> int:
+    """Run the node of a class in a module of this package; both are imported here."""
     end_on_signals()
     from ccr_ros.model.errors import CcrError
     from ccr_ros.runtime import enable_ros
 
     try:
         enable_ros()
-        from ccr_ros.nodes.solver_node import main
+        make = getattr(import_module(f"ccr_ros.nodes.{module}"), node)
+        from ccr_ros.nodes.runner import run
 
         for number in _SIGNALS:
             signal.signal(number, signal.default_int_handler)  # until rclpy.init brings its own
-        return main()
+        return run(make, module)
     except CcrError as error:
-        print(f"solver_node: error: {error}", file=sys.stderr)
+        print(f"{module}: error: {error}", file=sys.stderr)
         return 1

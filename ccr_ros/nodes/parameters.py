@@ -4,20 +4,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
-from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
 
 from ccr_ros.model import Gripper, InvalidValue, SolverSettings, load_gripper
 from ccr_ros.resources import find_config
 
+from .declarations import Declarations
 from .frames import prefix_of
 
 MARKERS = "markers"
 MARKER_RATE = "marker_rate"
-
-_FIXED = "Takes effect at start only."
 
 
 @dataclass(frozen=True)
@@ -45,59 +42,50 @@ def declare(node: Node) -> SolverParameters:
         rclpy.exceptions.ParameterException: A value is of the wrong type or out of its range.
     """
 
-    def fixed(name: str, default: Any, text: str, limits: str = "", **ranges: list) -> Any:
-        descriptor = ParameterDescriptor(
-            description=f"{text} {_FIXED}", additional_constraints=limits, read_only=True, **ranges
-        )
-        return node.declare_parameter(name, default, descriptor).value
-
-    gripper_file = fixed(
+    parameters = Declarations(node)
+    gripper_file = parameters.fixed(
         "gripper_file",
         "gripper_sphere",
         "Gripper file: a path, or the name of a file that comes with ccr_ros.",
     )
-    arcs = fixed(
+    arcs = parameters.fixed(
         "arcs_per_segment",
         SolverSettings.arcs_per_segment,
         "Number of arcs that a segment between two disks is modelled by; more are finer, slower.",
-        integer_range=[IntegerRange(from_value=1, to_value=64, step=1)],
+        (1, 64),
     )
-    cable_model = fixed(
+    cable_model = parameters.fixed(
         "cable_model",
         SolverSettings.cable_model,
         "frictionless: a cable's total length is given, its tension is uniform; "
         "proportional: every span is shortened alike.",
         "frictionless or proportional",
     )
-    time_limit = fixed(
+    time_limit = parameters.fixed(
         "time_limit",
         1.0,
         "Longest CPU time of one search [s]; a solve is one, or two where obstacles bar the way; "
         "one that takes longer ends without a new pose.",
-        floating_point_range=[FloatingPointRange(from_value=0.001, to_value=60.0, step=0.0)],
+        (0.001, 60.0),
     )
-    prefix = fixed(
+    prefix = parameters.fixed(
         "frame_prefix",
         prefix_of(node.get_namespace()),
         "Put before the fingers' frame names; its default comes from the node's namespace.",
         "no '/' at the start",
     )
-    gripper_frame = fixed(
+    gripper_frame = parameters.fixed(
         "gripper_frame",
         f"{prefix}gripper_base",
         "Frame the fingers stand in and objects are given in; its default has the frame_prefix.",
         "not empty, no '/' at the start",
     )
-    node.declare_parameter(
-        MARKERS, True, ParameterDescriptor(description="Publish markers for RViz and the like.")
-    )
-    node.declare_parameter(
+    parameters.live(MARKERS, True, "Publish markers for RViz and the like.")
+    parameters.live(
         MARKER_RATE,
         20.0,
-        ParameterDescriptor(
-            description="Most marker messages per second [Hz]; none are sent while nothing moves.",
-            floating_point_range=[FloatingPointRange(from_value=0.1, to_value=100.0, step=0.0)],
-        ),
+        "Most marker messages per second [Hz]; none are sent while nothing moves.",
+        (0.1, 100.0),
     )
     return SolverParameters(
         gripper=load_gripper(find_config(gripper_file)),

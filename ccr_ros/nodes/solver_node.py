@@ -6,18 +6,14 @@ Topics, frames and parameters: docs/interfaces.md.
 
 from __future__ import annotations
 
-import sys
 from collections import deque
 from collections.abc import Sequence
 from typing import Any
 
-import rclpy
 from ccr_msgs.msg import ObjectArray
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.clock import Clock, ClockType
 from rclpy.context import Context
-from rclpy.exceptions import ParameterException
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.timer import Timer
@@ -28,7 +24,7 @@ from visualization_msgs.msg import MarkerArray
 from ccr_ros.model import CcrError
 from ccr_ros.viz.markers import FingerView, SceneMarkers
 
-from . import parameters
+from . import parameters, runner
 from .conversions import transform_message
 from .diagnostics import FingerDiagnostics, make_status
 from .finger_channel import FingerChannel
@@ -221,54 +217,6 @@ class SolverNode(Node):
         self._diagnostics.publish(DiagnosticArray(header=header, status=statuses))
 
 
-def main(args: Sequence[str] | None = None) -> int:
-    """Run the node until it is interrupted; return the exit code."""
-    try:
-        try:
-            rclpy.init(args=args)
-        except Exception as error:  # bad --ros-args: rclpy has many kinds of error for them
-            return _cannot_start(error)
-        return _run()
-    except KeyboardInterrupt:
-        return 0
-    finally:
-        _shut_down()
-
-
 def spin(context: Context | None = None) -> None:
-    """Run the node in a context (default: rclpy's own) until this ends.
-
-    Raises:
-        CcrError, rclpy.exceptions.ParameterException: The node cannot start.
-    """
-    executor = None if context is None else SingleThreadedExecutor(context=context)
-    try:
-        rclpy.spin(SolverNode(context=context), executor)
-    except (CcrError, ParameterException):
-        raise
-    except Exception:  # among them ExternalShutdownException
-        # A signal takes the context down at once, and what is publishing just then fails.
-        if rclpy.ok(context=context):
-            raise
-
-
-def _run() -> int:
-    try:
-        spin()
-    except (CcrError, ParameterException) as error:
-        return _cannot_start(error)
-    return 0
-
-
-def _shut_down() -> None:
-    try:
-        rclpy.try_shutdown()
-    except Exception:
-        # rclpy answers signals in a thread of its own, which may have come first by a hair.
-        if rclpy.ok():
-            raise
-
-
-def _cannot_start(error: Exception) -> int:
-    print(f"solver_node: error: {' '.join(str(error).split())}", file=sys.stderr)
-    return 1
+    """Run the node in a context until this ends; see `runner.spin`."""
+    runner.spin(SolverNode, context)
