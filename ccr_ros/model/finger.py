@@ -13,9 +13,9 @@ import numpy as np
 from . import checks
 from .errors import InvalidValue, UnknownName
 from .obstacles import Obstacle
+from .rest_curvature import checked_rest_curvature
 
 MAX_SEGMENTS = 1000
-MAX_PIECES = 8  # of a segment, along which the rest curvature is linear
 _TINY, _HUGE = 1e-6, 1e3  # m; between these a length is believed
 
 
@@ -117,46 +117,12 @@ class Finger:
             "holes_per_disk",
             checks.integer("holes_per_disk", self.holes_per_disk, low=1, high=3600),
         )
-        put("rest_curvature", self._checked_rest_curvature())
+        rest = checked_rest_curvature(
+            self.rest_curvature, self.segments, *self.largest_rest_curvature
+        )
+        put("rest_curvature", rest)
         put("cables", self._checked_cables())
         put("obstacles", self._checked_obstacles())
-
-    def _checked_rest_curvature(self) -> np.ndarray:
-        n, value = self.segments, self.rest_curvature
-        if value is None:
-            rest = np.zeros((n, 3))
-        else:
-            allowed = f"{n} vectors of 3 numbers [1/m], one per segment"
-            if not checks.is_list(value):
-                raise InvalidValue("rest_curvature", value, f"{allowed}, or {n} lists of vectors")
-            if len(value) != n:
-                raise InvalidValue("rest_curvature", value, f"{allowed} (got {len(value)})")
-            if checks.is_list(value[0]) and len(value[0]) and checks.is_list(value[0][0]):
-                ends = len(value[0])
-                rest = np.array(
-                    [_curvatures(f"rest_curvature[{i}]", v, ends) for i, v in enumerate(value)]
-                )
-            else:
-                rest = np.array(
-                    [
-                        checks.vector(f"rest_curvature[{i}]", v, 3, unit="1/m")
-                        for i, v in enumerate(value)
-                    ]
-                )
-        # A segment bent further than half a turn, or so tightly that the inner side of a disk
-        # folds onto the next, is no finger.
-        limit, twist = self.largest_rest_curvature
-        for index in np.ndindex(rest.shape[:-1]):
-            u = rest[index]
-            if math.hypot(u[0], u[1]) >= limit or abs(u[2]) >= twist:
-                raise InvalidValue(
-                    "rest_curvature" + "".join(f"[{i}]" for i in index),
-                    [float(x) for x in u],
-                    f"bending < {limit:.6g} 1/m and twist < {twist:.6g} 1/m"
-                    " (disks would meet, or a segment turn by more than half a turn)",
-                )
-        rest.setflags(write=False)
-        return rest
 
     def _checked_cables(self) -> tuple[Cable, ...]:
         if not isinstance(self.cables, list | tuple) or not self.cables:
@@ -290,18 +256,3 @@ class Finger:
                 for c, v in zip(self.cable_names, values, strict=True)
             ]
         )
-
-
-def _curvatures(place: str, value: Any, ends: int) -> np.ndarray:
-    """Return the curvature (ends, 3) at the start and the end of each of a segment's pieces."""
-    most = 2 * MAX_PIECES
-    count = len(value) if checks.is_list(value) else 0
-    if count != ends or not 2 <= ends <= most or ends % 2:
-        number = str(ends) if 2 <= ends <= most and ends % 2 == 0 else f"2, 4, .. or {most}"
-        raise InvalidValue(
-            place,
-            value,
-            f"{number} vectors of 3 numbers [1/m], at the start and the end of each of its pieces,"
-            " as many for each segment",
-        )
-    return np.array([checks.vector(f"{place}[{i}]", v, 3, unit="1/m") for i, v in enumerate(value)])

@@ -1,0 +1,233 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The paper's algorithm Pre-bent: the rest shape that given pulls bend into a wanted shape.
+
+No nested optimisation is needed: at the wanted shape the rest curvature follows from equilibrium
+(`rest_statics`), with one unknown tension per taut cable that its pull decides (`tension_roots`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ccr_ros.model import checks
+from ccr_ros.model.equilibrium import EquilibriumProblem
+from ccr_ros.model.errors import InvalidValue, UnknownName
+from ccr_ros.model.finger import Finger
+from ccr_ros.model.result import disk_overlap, softest_direction
+from ccr_ros.model.settings import SolverSettings
+from ccr_ros.model.sqp import derive
+
+from .pose_fit import PIECES, PoseFit, fit_pose
+from .press import INSIDE, Press, deepest, pushes
+from .rest_statics import Push, RestPull, RestStatics
+from .target import DesiredShape
+from .tension_roots import taut_sets, tension_roots
+
+_SLACK = 1e-12  # of the finger's length; a slack cable may be so much too long
+_STABLE = 1e-6  # of the reduced Hessian's eigenvalues, as in certificates
+
+
+@dataclass(frozen=True, eq=False)
+class RestShape:
+    """A rest shape, and the equilibrium in the wanted shape that the pulls bend it into.
+
+    Attributes:
+        finger: The finger with this rest shape (``rest_curvature``), all else as it was given.
+        pulls: (m,) pull of each cable [m]; rest_lengths: (m,) what percentages are of [m].
+        tensions: (m,) [N, or per EI]; 0: slack.
+        rest: (n+1, 3) disk centres at rest [m].
+        actuated: (n+1, 3) disk centres in equilibrium [m]; frames: (n+1, 3, 3) disk frames.
+        energy: Elastic energy in equilibrium [J, or per EI].
+        largest_curvature: Largest bending of the rest shape [1/m].
+        rest_gap: Smallest distance of the rest shape from an obstacle [m]; inf without one.
+        residual: Largest unbalanced generalised force, relative to the largest elastic one.
+        smallest_eigenvalue: Of the reduced Hessian; see `Certificate`.
+        squared_error: Sum of the squared distances of the disk centres from the wanted ones [m^2].
+    """
+
+    finger: Finger
+    pulls: np.ndarray
+    rest_lengths: np.ndarray
+    tensions: np.ndarray
+    rest: np.ndarray
+    actuated: np.ndarray
+    frames: np.ndarray
+    energy: float
+    largest_curvature: float
+    rest_gap: float
+    residual: float
+    smallest_eigenvalue: float
+    squared_error: float
+
+    @property
+    def stable(self) -> bool:
+        """Whether the actuated shape is a strict minimum of the energy."""
+        return self.smallest_eigenvalue > _STABLE
+
+
+@dataclass(frozen=True, eq=False)
+class RestDesign:
+    """What was found for a wanted shape and pulls.
+
+    Attributes:
+        shapes: The rest shapes, that of the least tension first; none: ``refused`` says why.
+        refused: A line for each that was left out.
+        fit: The pose that stands for the wanted shape.
+    """
+
+    shapes: tuple[RestShape, ...]
+    refused: tuple[str, ...]
+    fit: PoseFit
+
+
+class RestShapeSolver:
+    """Finds rest shapes of one finger; built once, for as many wanted shapes as one likes.
+
+    Args:
+        finger: Its own rest shape does not matter; its obstacles are those of the wanted shape.
+    """
+
+    def __init__(self, finger: Finger) -> None:
+        straight = np.zeros((finger.segments, 2 * PIECES, 3))
+        self.finger = finger
+        self.problem = EquilibriumProblem(
+            replace(finger, rest_curvature=straight), SolverSettings(tolerance=1e-12)
+        )
+
+    def solve(
+        self,
+        shape: DesiredShape,
+        pulls: Mapping[str, RestPull],
+        presses: Sequence[Press] = (),
+        max_curvature: float | None = None,
+    ) -> RestDesign:
+        """Return all rest shapes found that the pulls bend into the wanted shape.
+
+        Args:
+            shape: Where the disks shall be.
+            pulls: By cable; those not named are not pulled (and hold, if the shape wants them
+                longer than at rest).
+            presses: Contact forces in the wanted shape; every other point presses with none.
+            max_curvature: Largest bending of the rest shape [1/m]; ``None``: where disks meet.
+
+        Raises:
+            InvalidValue: The finger cannot span the shape, the shape stands in an obstacle, or a
+                press does not touch one.
+            UnknownName: A cable that the finger does not have.
+        """
+        finger, problem = self.finger, self.problem
+        shape.check_fits(finger)
+        for name in pulls:
+            if name not in finger.cable_names:
+                raise UnknownName("cable", name, finger.cable_names)
+        given = [pulls.get(name, RestPull(0.0)) for name in finger.cable_names]
+        bending, twist = finger.largest_rest_curvature
+        if max_curvature is not None:
+            bending = checks.real("max_curvature", max_curvature, above=0, high=bending, unit="1/m")
+        fit = fit_pose(problem, shape)
+        at = problem.evaluate(fit.y)
+        depth, disk, name = deepest(problem, at)
+        if depth > INSIDE:
+            raise InvalidValue(
+                "shape",
+                f"disk {disk}",
+                f"clear of obstacle {name!r} (it is {depth * 1e3:.4g} mm inside; a best fit may be"
+                " asked for)",
+            )
+        forces = pushes(problem, at, presses)
+        statics = RestStatics(problem, fit.y, given, forces, bending, twist)
+        shapes: list[RestShape] = []
+        refused: list[str] = []
+        count = len(given)
+        for taut in taut_sets(count):
+            for tensions in tension_roots(statics, taut, count):
+                complaint = self._complaint(statics, tensions, taut)
+                if complaint is None:
+                    shapes.append(self._shape(statics, tensions, forces, shape, fit))
+                elif complaint:
+                    refused.append(complaint)
+        if not shapes and not refused:
+            refused.append(_out_of_reach(statics, finger))
+        shapes.sort(key=lambda s: float(s.tensions.max(initial=0.0)))
+        return RestDesign(tuple(shapes), tuple(dict.fromkeys(refused)), fit)
+
+    def _complaint(
+        self, statics: RestStatics, tensions: np.ndarray, taut: Sequence[int]
+    ) -> str | None:
+        """Return why a root is no rest shape; None if it is one, and "" if nobody would miss it."""
+        finger, problem = self.finger, self.problem
+        pushing = [j for j in taut if tensions[j] < 0]
+        if pushing:
+            unit = finger.bending_stiffness / finger.length**2
+            word = "N" if finger.forces_are == "newton" else "1/m^2 per EI"
+            return "; ".join(
+                f"cable {finger.cable_names[j]} would have to push with"
+                f" {-tensions[j] * unit:.4g} {word}, which a cable cannot: pull it less, or"
+                " another one more"
+                for j in pushing
+            )
+        slack = [j for j in range(len(tensions)) if j not in taut]
+        if slack and statics.missing(tensions)[0][slack].min() < -_SLACK:
+            return ""  # it would be taut, and stands in a set in which it is
+        at = problem.evaluate(statics.rest(tensions))
+        axes = at.rod.rotations[::PIECES, :, 2]
+        radius = finger.disk_radius / finger.length
+        overlap = disk_overlap(at.points[problem.points.backbone], axes, radius)
+        worst = int(np.argmax(overlap))
+        if overlap[worst] > 0:
+            return (
+                f"disks {worst} and {worst + 1} would cut each other at rest by"
+                f" {overlap[worst] * finger.length * 1e3:.3g} mm"
+            )
+        return None
+
+    def _shape(
+        self,
+        statics: RestStatics,
+        tensions: np.ndarray,
+        forces: Sequence[Push],
+        shape: DesiredShape,
+        fit: PoseFit,
+    ) -> RestShape:
+        rest = statics.rest(tensions)
+        ends = statics.curvature_ends(rest)
+        curvature = ends.reshape(shape.segments, 2 * PIECES, 3)
+        problem = self.problem.with_rest_curvature(curvature)
+        finger, length = problem.finger, problem.finger.length
+        table = np.zeros((len(problem.obstacles), len(problem.points.labels)))
+        for push in forces:
+            table[push.obstacle, push.point] = push.force
+        point = derive(problem, problem.evaluate(fit.y - rest), tensions, table)
+        rest_lengths = problem.rest_lengths * length
+        centres = problem.points.backbone
+        gaps = problem.rest.distances[:, ~problem.fixed]
+        return RestShape(
+            finger=finger,
+            pulls=rest_lengths - point.at.lengths * length - _spare(statics, tensions) * length,
+            rest_lengths=rest_lengths,
+            tensions=tensions * finger.bending_stiffness / length**2,
+            rest=problem.rest.points[centres] * length,
+            actuated=point.at.points[centres] * length,
+            frames=point.at.rod.rotations[::PIECES],
+            energy=0.5 * float(point.at.y @ point.at.y) * finger.bending_stiffness / length,
+            largest_curvature=float(np.hypot(ends[:, 0], ends[:, 1]).max()),
+            rest_gap=float(gaps.min(initial=np.inf)) * length,
+            residual=point.residual,
+            smallest_eigenvalue=softest_direction(point)[0],
+            squared_error=fit.squared_error,
+        )
+
+
+def _spare(statics: RestStatics, tensions: np.ndarray) -> np.ndarray:
+    """By how much (m,) a slack cable could be shorter (units of L)."""
+    return np.where(tensions > 0, 0.0, np.maximum(statics.missing(tensions)[0], 0.0))
+
+
+def _out_of_reach(statics: RestStatics, finger: Finger) -> str:
+    return (
+        "no tensions give these pulls while the rest curvature stays within bounds: pull less, or"
+        " allow more"
+    )
