@@ -16,13 +16,14 @@ from ccr_ros.model import checks
 from ccr_ros.model.equilibrium import EquilibriumProblem
 from ccr_ros.model.errors import InvalidValue, UnknownName
 from ccr_ros.model.finger import Finger
-from ccr_ros.model.result import disk_overlap, softest_direction
+from ccr_ros.model.result import softest_direction
 from ccr_ros.model.settings import SolverSettings
 from ccr_ros.model.sqp import derive
 
 from .pose_fit import PIECES, PoseFit, fit_pose
 from .press import INSIDE, Press, deepest, pushes
-from .rest_statics import Push, RestPull, RestStatics
+from .pull import Pull
+from .rest_statics import Push, RestStatics
 from .target import DesiredShape
 from .tension_roots import taut_sets, tension_roots
 
@@ -73,8 +74,8 @@ class RestDesign:
     """What was found for a wanted shape and pulls.
 
     Attributes:
-        shapes: The rest shapes, that of the least tension first; none: ``refused`` says why.
-        refused: A line for each that was left out.
+        shapes: The rest shapes, that of the least tension first.
+        refused: Where there is none, lines that say why.
         fit: The pose that stands for the wanted shape.
     """
 
@@ -100,7 +101,7 @@ class RestShapeSolver:
     def solve(
         self,
         shape: DesiredShape,
-        pulls: Mapping[str, RestPull],
+        pulls: Mapping[str, Pull],
         presses: Sequence[Press] = (),
         max_curvature: float | None = None,
     ) -> RestDesign:
@@ -120,10 +121,7 @@ class RestShapeSolver:
         """
         finger, problem = self.finger, self.problem
         shape.check_fits(finger)
-        for name in pulls:
-            if name not in finger.cable_names:
-                raise UnknownName("cable", name, finger.cable_names)
-        given = [pulls.get(name, RestPull(0.0)) for name in finger.cable_names]
+        given = _checked_pulls(finger, pulls)
         bending, twist = finger.largest_rest_curvature
         if max_curvature is not None:
             bending = checks.real("max_curvature", max_curvature, above=0, high=bending, unit="1/m")
@@ -140,49 +138,22 @@ class RestShapeSolver:
         forces = pushes(problem, at, presses)
         statics = RestStatics(problem, fit.y, given, forces, bending, twist)
         shapes: list[RestShape] = []
-        refused: list[str] = []
-        count = len(given)
-        for taut in taut_sets(count):
-            for tensions in tension_roots(statics, taut, count):
-                complaint = self._complaint(statics, tensions, taut)
-                if complaint is None:
+        pushing: list[str] = []
+        held: list[str] = []
+        for taut in taut_sets(len(given)):
+            for tensions in tension_roots(statics, taut, len(given)):
+                spare = statics.missing(tensions)[0]
+                short = [j for j in range(len(given)) if j not in taut and spare[j] < -_SLACK]
+                if tensions.min() < 0:
+                    pushing.append(_pushing(finger, tensions))
+                elif short:  # it would be taut, and stands in a set in which it is
+                    held += [_held(finger, spare, short)] if taut else []
+                else:
                     shapes.append(self._shape(statics, tensions, forces, shape, fit))
-                elif complaint:
-                    refused.append(complaint)
-        if not shapes and not refused:
-            refused.append(_out_of_reach(statics, finger))
         shapes.sort(key=lambda s: float(s.tensions.max(initial=0.0)))
+        # What cables cannot do matters where there is nothing that they can.
+        refused = [] if shapes else [_out_of_reach(statics, given, finger), *pushing, *held]
         return RestDesign(tuple(shapes), tuple(dict.fromkeys(refused)), fit)
-
-    def _complaint(
-        self, statics: RestStatics, tensions: np.ndarray, taut: Sequence[int]
-    ) -> str | None:
-        """Return why a root is no rest shape; None if it is one, and "" if nobody would miss it."""
-        finger, problem = self.finger, self.problem
-        pushing = [j for j in taut if tensions[j] < 0]
-        if pushing:
-            unit = finger.bending_stiffness / finger.length**2
-            word = "N" if finger.forces_are == "newton" else "1/m^2 per EI"
-            return "; ".join(
-                f"cable {finger.cable_names[j]} would have to push with"
-                f" {-tensions[j] * unit:.4g} {word}, which a cable cannot: pull it less, or"
-                " another one more"
-                for j in pushing
-            )
-        slack = [j for j in range(len(tensions)) if j not in taut]
-        if slack and statics.missing(tensions)[0][slack].min() < -_SLACK:
-            return ""  # it would be taut, and stands in a set in which it is
-        at = problem.evaluate(statics.rest(tensions))
-        axes = at.rod.rotations[::PIECES, :, 2]
-        radius = finger.disk_radius / finger.length
-        overlap = disk_overlap(at.points[problem.points.backbone], axes, radius)
-        worst = int(np.argmax(overlap))
-        if overlap[worst] > 0:
-            return (
-                f"disks {worst} and {worst + 1} would cut each other at rest by"
-                f" {overlap[worst] * finger.length * 1e3:.3g} mm"
-            )
-        return None
 
     def _shape(
         self,
@@ -221,13 +192,58 @@ class RestShapeSolver:
         )
 
 
+def _pushing(finger: Finger, tensions: np.ndarray) -> str:
+    """Which cables would have to push, and how hard."""
+    unit = finger.bending_stiffness / finger.length**2
+    word = "N" if finger.forces_are == "newton" else "1/m^2 per EI"
+    return "; ".join(
+        f"cable {name} would have to push with {-tension * unit:.4g} {word}, which a cable cannot"
+        for name, tension in zip(finger.cable_names, tensions, strict=True)
+        if tension < 0
+    )
+
+
+def _held(finger: Finger, spare: np.ndarray, short: Sequence[int]) -> str:
+    """What cables that would hold must be paid out by, for the others alone to bend the finger."""
+    return " and ".join(
+        f"cable {finger.cable_names[j]} paid out by {-spare[j] * finger.length * 1e3:.4g} mm more"
+        " would be slack, and there would be one"
+        for j in short
+    )
+
+
+def _checked_pulls(finger: Finger, pulls: Mapping[str, Pull]) -> list[Pull]:
+    """Return a pull for each cable; 0 for those not named."""
+    for name, pull in pulls.items():
+        if name not in finger.cable_names:
+            raise UnknownName("cable", name, finger.cable_names)
+        if not isinstance(pull, Pull):
+            raise InvalidValue(f"pulls.{name}", pull, "a Pull")
+        if pull.relative:
+            checks.real(f"pulls.{name}", pull.value, low=-2, below=1)
+        else:
+            limit = 2 * finger.length
+            checks.real(f"pulls.{name}", pull.value, low=-limit, high=limit, unit="m")
+    return [pulls.get(name, Pull(0.0)) for name in finger.cable_names]
+
+
 def _spare(statics: RestStatics, tensions: np.ndarray) -> np.ndarray:
     """By how much (m,) a slack cable could be shorter (units of L)."""
     return np.where(tensions > 0, 0.0, np.maximum(statics.missing(tensions)[0], 0.0))
 
 
-def _out_of_reach(statics: RestStatics, finger: Finger) -> str:
-    return (
-        "no tensions give these pulls while the rest curvature stays within bounds: pull less, or"
-        " allow more"
+def _out_of_reach(statics: RestStatics, given: Sequence[Pull], finger: Finger) -> str:
+    """Why no tensions were found: for one cable, the pulls between the bounds are told."""
+    bending = statics.limits[0]
+    line = f"no tensions give these pulls while the rest shape bends by less than {bending:.4g} 1/m"
+    if len(given) > 1:
+        return f"{line}: pull less, or differently"
+    unit = np.ones(1)
+    end = statics.reach(np.zeros(1), unit)
+    tensions = np.linspace(0.0, end, 25)
+    longest = max(
+        float(statics.problem.evaluate(statics.rest(t * unit)).lengths[0]) for t in tensions
     )
+    room = longest - float(statics.at.lengths[0])
+    most = f"{room / longest:.3%}" if given[0].relative else f"{room * finger.length * 1e3:.4g} mm"
+    return f"{line}: the pull can be {most} at most"

@@ -23,32 +23,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ccr_ros.model import checks
 from ccr_ros.model.equilibrium import EquilibriumProblem
 
-
-@dataclass(frozen=True)
-class RestPull:
-    """A wanted pull of a cable whose rest length is not known yet.
-
-    Attributes:
-        value: [m], or a fraction of the cable's length inside the finger at rest.
-        of_rest: It is that fraction.
-
-    Raises:
-        InvalidValue: Not finite, or a fraction of 1 or more.
-    """
-
-    value: float
-    of_rest: bool = False
-
-    def __post_init__(self) -> None:
-        value = (
-            checks.real("pull", self.value, low=-2, below=1)
-            if self.of_rest
-            else checks.real("pull", self.value, unit="m")
-        )
-        object.__setattr__(self, "value", value)
+from .pull import Pull
 
 
 @dataclass(frozen=True)
@@ -75,13 +52,17 @@ class RestStatics:
         pulls: One per cable.
         pushes: The contact forces at the pose.
         bending, twist: Largest curvature [1/m] that the rest shape may have.
+
+    Attributes:
+        at: The pose. limits: The largest bending and twist.
+        free_rest: (N,) the rest shape for slack cables; pull_rows: (m, N) A.
     """
 
     def __init__(
         self,
         problem: EquilibriumProblem,
         y: np.ndarray,
-        pulls: Sequence[RestPull],
+        pulls: Sequence[Pull],
         pushes: Sequence[Push] = (),
         bending: float = math.inf,
         twist: float = math.inf,
@@ -96,10 +77,10 @@ class RestStatics:
             rows, _, _ = problem.contact_rows(self.at, first, pairs)
             self.free_rest = y + np.array([p.force for p in pushes]) @ rows
         length = problem.finger.length
-        self._factor = np.array([1.0 - p.value if p.of_rest else 1.0 for p in pulls])
-        self._offset = np.array([0.0 if p.of_rest else p.value / length for p in pulls])
+        self._factor = np.array([1.0 - p.value if p.relative else 1.0 for p in pulls])
+        self._offset = np.array([0.0 if p.relative else p.value / length for p in pulls])
         self._offset = self._offset + self.at.lengths
-        self._limits = bending, twist
+        self.limits = bending, twist
         self._base = self.curvature_ends(self.free_rest)
         self._slopes = np.array([self.curvature_ends(row) for row in self.pull_rows])
 
@@ -129,7 +110,7 @@ class RestStatics:
         """Return how far from tensions (m,) along a way (m,) the rest curvature stays in bounds."""
         here = self._base + np.tensordot(start, self._slopes, 1)
         slope = np.tensordot(way, self._slopes, 1)
-        bending, twist = self._limits
+        bending, twist = self.limits
         a = np.sum(slope[:, :2] ** 2, axis=1)
         b = np.sum(slope[:, :2] * here[:, :2], axis=1)
         c = np.sum(here[:, :2] ** 2, axis=1) - bending**2

@@ -22,6 +22,7 @@ from ..model.errors import InvalidValue
 from ..model.finger import Cable, Finger
 from ..model.solution import Solution
 from ..model.solver import FingerSolver
+from .pull import Pull
 from .routing_chain import Target
 from .routing_free import Fit, fitted
 from .routing_search import Found, RoutingSearch
@@ -36,14 +37,6 @@ _FREE_HOLES = 12  # at least, where the search for free angles begins
 _FREE_EXACT = 1e-9  # m, RMS of a disk: no other start is tried
 _SAME_ANGLE = 1e-6  # rad
 _LEAST_SPAN, _LARGEST_SPAN = 0.5, 1.1  # of a segment's length, between neighbouring centres
-
-
-@dataclass(frozen=True)
-class Pull:
-    """The pull of one cable: ``value`` [m], or that part of the cable's length at rest."""
-
-    value: float
-    relative: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -130,6 +130,10 @@ def _newton(statics: RestStatics, index: np.ndarray, start: np.ndarray) -> np.nd
             step = np.linalg.solve(jacobian[np.ix_(index, index)], -g)
         except np.linalg.LinAlgError:
             return None
+        # Roots with too much curvature at rest are not wanted, and beyond all shapes are wild.
+        way = np.zeros(len(t))
+        way[index] = step
+        step = step * min(1.0, 0.9 * statics.reach(t, way))
         for _ in range(8):
             trial = t.copy()
             trial[index] += step
