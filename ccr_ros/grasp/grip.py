@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is held: each finger's target force, and the pull below which it never goes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from .finger_control import FingerControl
+from .progress import Lasting
+from .regulation import ForceLaw
+from .settings import GraspSettings
+
+
+class Grip:
+    """Regulates the forces of the fingers that hold, and knows when the object is lost.
+
+    A grip that was once complete is *committed*: until a release nothing commands one of its
+    fingers below its floor, the place where it first touched, whatever is measured.
+
+    Args:
+        fingers: All fingers.
+        settings: Forces, speeds and times.
+    """
+
+    def __init__(self, fingers: Mapping[str, FingerControl], settings: GraspSettings) -> None:
+        self._fingers = fingers
+        self._settings = settings
+        self.law = ForceLaw(settings.force_gain, settings.force_speed, settings.force_dead_band)
+        self.committed = False
+        self.thing = ""
+        self.required: tuple[str, ...] = tuple(fingers)
+        self.targets: dict[str, float] = {}  # [N] of the fingers whose force is regulated
+        self.floors: dict[str, float] = {}  # [m]
+        self._lost = {name: Lasting() for name in fingers}
+
+    def clear(self) -> None:
+        """Forget the grip: a release begins."""
+        self.committed = False
+        self.thing = ""
+        self.required = tuple(self._fingers)
+        self.targets.clear()
+        self.floors.clear()
+
+    # What is felt
+
+    def force(self, finger: FingerControl) -> float:
+        """Return a finger's force on the object [N]."""
+        return finger.force(self.thing)
+
+    def touches(self, finger: FingerControl) -> bool:
+        """Tell whether a finger touches the object."""
+        return self.force(finger) >= self._settings.contact_force
+
+    def agrees(self, finger: FingerControl) -> bool:
+        """Tell whether a finger touches, in a pose that is not stale, and its effort agrees."""
+        known = finger.solved is not None and not finger.solved.stale
+        return (
+            known and self.touches(finger) and finger.effort_excess >= self._settings.effort_margin
+        )
+
+    @property
+    def needed(self) -> list[FingerControl]:
+        """The required fingers."""
+        return [self._fingers[name] for name in self.required]
+
+    @property
+    def complete(self) -> bool:
+        """Whether all required fingers touch, and their efforts agree."""
+        return all(self.agrees(finger) for finger in self.needed)
+
+    # What is done
+
+    def touch(self, finger: FingerControl) -> None:
+        """Note where a finger began to touch; a committed floor stays."""
+        if not self.committed or finger.name not in self.floors:
+            self.floors[finger.name] = min(finger.place, finger.solved_place)
+
+    def commit(self, force: float | None) -> None:
+        """Hold from now on: with this target [N], or each finger with the force it has."""
+        for finger in self._fingers.values():
+            if self.touches(finger) or finger.name in self.required:
+                self.targets[finger.name] = self.force(finger) if force is None else force
+                floor = self.floors.get(finger.name, finger.place)
+                self.floors[finger.name] = min(floor, finger.place)
+        self.committed = True
+        self._lost = {name: Lasting() for name in self._fingers}
+
+    def regulate(self, finger: FingerControl, target: float, seconds: float) -> None:
+        """Move a finger's command so that its force comes nearer to a target.
+
+        Not at a pose that is stale. At one that is not stable no farther; before a grip is
+        committed back as far as the law wants, then only down to the floor.
+        """
+        solved, settings = finger.solved, self._settings
+        if solved is None or solved.stale:
+            return
+        step = self.law.step(self.force(finger), target, seconds)
+        at = finger.measured_place
+        high = min(finger.limit, max(finger.place, at + settings.max_lead))
+        if not solved.stable:
+            high = finger.place
+        low = 0.0
+        if self.committed:
+            low = self.floors.get(finger.name, finger.place)
+        low = min(low, finger.place)
+        finger.place = min(max(finger.place + step, low), high)
+
+    def hold(self, now: float, seconds: float) -> str:
+        """Regulate all that hold; return the name of a required finger that lost touch, if any."""
+        for name, target in self.targets.items():
+            self.regulate(self._fingers[name], target, seconds)
+        for finger in self.needed:
+            lost = self._lost[finger.name]
+            if lost.holds(not self.touches(finger), now, self._settings.loss_time):
+                return finger.name
+        return ""

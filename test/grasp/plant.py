@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Fingers, servos and a solver in a few lines, for the coordinator without ROS.
+
+A finger touches at a place and is a spring from there on; a servo follows with a lag; the solver
+answers one step later. Figures are those of the sphere gripper.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ccr_ros.grasp.coordinator import GripperCoordinator
+from ccr_ros.grasp.finger_control import FingerControl, SolvedFinger
+from ccr_ros.grasp.free_motion import FreeMotion
+from ccr_ros.grasp.pull_path import PullPath
+from ccr_ros.grasp.runs import grasp_goal, release_goal
+from ccr_ros.grasp.settings import GraspSettings
+
+STEP = 0.02  # s
+LENGTH = 0.0062  # m
+TOUCH = 0.0054  # m
+STIFFNESS = 720.0  # N/m, of the contact
+FREE = 900.0  # N/m, tension of the free finger
+SHARE = 8.0  # tension per contact force
+NAMES = ("finger_1", "finger_2", "finger_3")
+
+
+def free_motion(length: float = LENGTH) -> FreeMotion:
+    places = np.array([0.0, length])
+    return FreeMotion(places, FREE * places[:, None], np.array([0.15, 0.04]))
+
+
+class Plant:
+    """A gripper that is simulated, with its coordinator; ``run`` lets time pass."""
+
+    def __init__(
+        self, settings: GraspSettings | None = None, lag: float = 0.06, step: float = STEP, **places
+    ) -> None:
+        path = PullPath(np.array([0.0]), np.array([LENGTH]))
+        self.settings = settings or GraspSettings()
+        self.control = {n: FingerControl(n, ("main",), path, free_motion()) for n in NAMES}
+        self.gripper = GripperCoordinator(tuple(self.control.values()), self.settings)
+        self.touch = dict.fromkeys(NAMES, TOUCH)
+        self.thing = "ball"
+        self.at = {name: places.get(name, 0.0) for name in NAMES}
+        self.wanted = dict(self.at)
+        self.solved: dict[str, SolvedFinger] = {}
+        self.lag = lag
+        self.seconds = step
+        self.now = 100.0
+        self.bridge_silent = self.solver_silent = False
+        self.stale: set[str] = set()
+        self.unstable: set[str] = set()
+        self.stuck: set[str] = set()
+        self.limp: set[str] = set()  # touch that no tension tells of
+        self.history: list[dict[str, float]] = []  # commanded places
+
+    def force(self, name: str) -> float:
+        return max(0.0, STIFFNESS * (self.at[name] - self.touch[name]))
+
+    def forces(self) -> list[float]:
+        return [self.force(name) for name in NAMES]
+
+    def advance(self) -> None:
+        self.now += self.seconds
+        for name, finger in self.control.items():
+            if name in self.solved and not self.solver_silent:
+                self.control[name].hear_solved(self.solved[name], self.now)
+            if self.gripper.commanding and not self.bridge_silent:
+                self.wanted[name] = finger.path.place(finger.command)
+            if name not in self.stuck and not self.bridge_silent:
+                way = self.wanted[name] - self.at[name]
+                self.at[name] += way * -math.expm1(-self.seconds / self.lag)
+            if not self.bridge_silent:
+                finger.hear_pulls(np.array([self.at[name]]), self.now)
+            force = self.force(name)
+            tension = FREE * self.at[name] + SHARE * force * (name not in self.limp)
+            self.solved[name] = SolvedFinger(
+                np.array([self.at[name]]),
+                np.array([tension]),
+                ((self.thing, force),) if force else (),
+                stale=name in self.stale,
+                stable=name not in self.unstable,
+            )
+        self.gripper.step(self.now)
+        self.history.append({name: finger.place for name, finger in self.control.items()})
+
+    def run(self, seconds: float) -> None:
+        for _ in range(round(seconds / self.seconds)):
+            self.advance()
+
+    def until(self, condition, seconds: float = 60.0) -> None:
+        end = self.now + seconds
+        while not condition():
+            assert self.now < end, f"{self.gripper.state}: {self.gripper.message}"
+            self.advance()
+
+    def grasp(self, **values):
+        goal = grasp_goal(self.settings, NAMES, **values)
+        return self.gripper.grasp(goal, self.now)
+
+    def release(self, **values):
+        return self.gripper.release(release_goal(**values), self.now)
+
+    def finish(self, run, seconds: float = 60.0):
+        self.until(lambda: run.outcome is not None, seconds)
+        return run.outcome
+
+    def holding(self, force: float = 0.2) -> Plant:
+        """Bring the gripper to hold."""
+        self.run(0.2)
+        assert self.finish(self.grasp(force=force)).reached
+        return self
