@@ -123,6 +123,7 @@ def test_the_node_dependencies_of_embedded_ros_stay_optional():
         "casadi",
         "numpy",
         "pyyaml",
+        "transitions",
     }
 
 
