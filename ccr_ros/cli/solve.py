@@ -74,7 +74,10 @@ def run(args: argparse.Namespace) -> int:
 
 
 def parse_pulls(
-    words: list[str], cables: tuple[str, ...], rest_lengths: np.ndarray
+    words: list[str],
+    cables: tuple[str, ...],
+    rest_lengths: np.ndarray,
+    option: str = "--pull",
 ) -> dict[str, float]:
     """Return pulls [m] by cable from words: ``main=4%`` (of the rest length) or ``main=0.007``.
 
@@ -86,12 +89,12 @@ def parse_pulls(
     for word in words:
         cable, equals, text = word.partition("=")
         if not equals:
-            raise InvalidValue("--pull", word, "CABLE=VALUE, such as main=4% or main=0.007")
+            raise InvalidValue(option, word, "CABLE=VALUE, such as main=4% or main=0.007")
         if cable not in cables:
             raise UnknownName("cable", cable, cables)
         if cable in pulls:
-            raise InvalidValue(f"--pull {cable}", word, "given once per cable")
-        value, relative = parse_pull(f"--pull {cable}", text)
+            raise InvalidValue(f"{option} {cable}", word, "given once per cable")
+        value, relative = parse_pull(f"{option} {cable}", text)
         length = float(rest_lengths[cables.index(cable)])
         pulls[cable] = value * length if relative else value
     return pulls

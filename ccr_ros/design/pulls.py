@@ -214,7 +214,8 @@ class _Search:
     @property
     def reached(self) -> bool:
         """Whether the target is reached, within the limits."""
-        return self.model.error <= self._planner.tolerance and self.model.excess.max() <= _FULL
+        near = self.model.error <= self._planner.tolerance
+        return bool(near and self.model.excess.max() <= _FULL)
 
     def run(self) -> Generator[None, None, None]:
         """Go to the target, or as near as the limits let."""
@@ -281,7 +282,7 @@ class _Search:
         return PullModel(self._solver.problem, self._solver.point, self._target, planner.limits)
 
     def _is_flat(self, newton: Step) -> bool:
-        return self.offset <= _OPTIMAL and self.model.excess.max() <= _FULL
+        return bool(self.offset <= _OPTIMAL and self.model.excess.max() <= _FULL)
 
     def _allowed(self, step: Step) -> float:
         """The merit below which a step is taken; one that eases tensions may lose a little."""

@@ -41,17 +41,16 @@ class TargetError:
     force: float | None = None
     gap: float | None = None
 
-    @property
-    def text(self) -> str:
-        """The error for people, e.g. ``1.2 mm, 0.3 deg``."""
+    def text(self, unit: str = "N") -> str:
+        """The error for people, forces in ``unit``: ``1.2 mm, 0.3 deg``."""
         parts = []
         if self.position is not None:
             parts.append(f"{self.position * 1e3:.3g} mm")
         if self.rotation is not None:
             parts.append(f"{math.degrees(self.rotation):.3g} deg")
         if self.force is not None:
-            parts.append(f"{self.force:+.3g} of the force")
-        if self.gap is not None:
+            parts.append(f"{self.force:+.3g} {unit}")
+        if self.gap:
             parts.append(f"{self.gap * 1e3:.3g} mm from the obstacle")
         return ", ".join(parts)
 

@@ -89,7 +89,7 @@ def test_errors_in_the_units_of_people() -> None:
     tip, turn = solution.backbone[-1], solution.tip.orientation
     off = TipTarget(tip + np.array([0.003, 0, 0.004]), turn).error(solver.problem, solver.point)
     assert off.position == pytest.approx(0.005) and off.rotation == pytest.approx(0, abs=1e-6)
-    assert off.text.startswith("5 mm")
+    assert off.text().startswith("5 mm")
     half = Pose(np.zeros(3), [0, 0, np.sin(0.25), np.cos(0.25)])  # 0.5 rad about z
     wanted = (solution.tip @ half).orientation
     assert TipTarget(None, wanted).error(solver.problem, solver.point).rotation == pytest.approx(
