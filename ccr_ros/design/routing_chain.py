@@ -18,6 +18,8 @@ import numpy as np
 from ..model.rotation import cross
 from .routing_table import SegmentTable
 
+_LEAST = 1e-10  # of a cable's yielding, relative
+
 
 @dataclass(frozen=True, eq=False)
 class Target:
@@ -37,6 +39,32 @@ class Target:
     lever: float
     fractions: np.ndarray
     pulls: np.ndarray
+
+    def errors(self, disk: int, rotation: np.ndarray, position: np.ndarray) -> np.ndarray:
+        """Errors (b, m) of poses (b, 3, 3), (b, 3) of a disk, all as positions."""
+        off = position - self.points[disk]
+        if self.frames is not None:
+            turned = rotation @ self.frames[disk].T
+            axial = turned[:, [2, 0, 1], [1, 2, 0]] - turned[:, [1, 2, 0], [2, 0, 1]]
+            return np.concatenate([off, 0.5 * self.lever * axial], axis=1)
+        if self.tangents is not None:
+            tilt = self.lever * (rotation[:, :, 2] - self.tangents[disk])
+            return np.concatenate([off, tilt], axis=1)
+        return off
+
+    def slopes(
+        self, disk: int, rotation: np.ndarray, turn: np.ndarray, drift: np.ndarray
+    ) -> np.ndarray:
+        """Change (b, k, m) of these errors with angular velocities and velocities (b, k, 3).
+
+        Of frames to first order in their error.
+        """
+        if self.frames is not None:
+            return np.concatenate([drift, self.lever * turn], axis=2)
+        if self.tangents is not None:
+            tilt = self.lever * cross(turn, rotation[:, None, :, 2])
+            return np.concatenate([drift, tilt], axis=2)
+        return drift
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +107,10 @@ class Chain:
     def settled(self, target: Target) -> tuple[np.ndarray, np.ndarray]:
         """Changes of tensions (b, C) that give complete routings the target's pulls, and errors."""
         wanted = self.slack * (1.0 - target.fractions) - target.pulls
-        change = np.linalg.solve(self.stretch, (wanted - self.lengths)[:, :, None])[:, :, 0]
+        # Two cables through the same holes share their tension evenly.
+        least = _LEAST * np.trace(self.stretch, axis1=1, axis2=2)
+        stretch = self.stretch + least[:, None, None] * np.eye(len(target.pulls))
+        change = np.linalg.solve(stretch, (wanted - self.lengths)[:, :, None])[:, :, 0]
         bent = (self.dd @ change[:, :, None])[:, :, 0]
         return change, self.ee + (change * (2.0 * self.ed + bent)).sum(axis=1)
 
@@ -102,23 +133,8 @@ def extended(
     drift = chain.drift[rows] + cross(turn, step[:, None]) + piece.drift @ back
     turn = turn + piece.turn @ back
     rotation = before @ piece.rotation
-    errors = [(position - target.points[disk], drift)]
-    if target.frames is not None:
-        off = rotation @ target.frames[disk].T
-        axial = np.stack(
-            [off[:, 2, 1] - off[:, 1, 2], off[:, 0, 2] - off[:, 2, 0], off[:, 1, 0] - off[:, 0, 1]],
-            axis=1,
-        )
-        errors.append((target.lever * 0.5 * axial, target.lever * turn))
-    elif target.tangents is not None:
-        axis = rotation[:, :, 2]
-        off = axis - target.tangents[disk]
-        errors.append((target.lever * off, target.lever * cross(turn, axis[:, None])))
-    ee, ed, dd = chain.ee[rows], chain.ed[rows], chain.dd[rows]
-    for e, d in errors:
-        ee = ee + (e * e).sum(axis=1)
-        ed = ed + (d @ e[:, :, None])[:, :, 0]
-        dd = dd + d @ d.transpose(0, 2, 1)
+    e = target.errors(disk, rotation, position)
+    d = target.slopes(disk, rotation, turn, drift)
     return Chain(
         np.concatenate([chain.states[rows], states[:, None]], axis=1),
         rotation,
@@ -128,9 +144,9 @@ def extended(
         chain.lengths[rows] + piece.lengths,
         chain.slack[rows] + piece.slack,
         chain.stretch[rows] + piece.stretch,
-        ee,
-        ed,
-        dd,
+        chain.ee[rows] + (e * e).sum(axis=1),
+        chain.ed[rows] + (d @ e[:, :, None])[:, :, 0],
+        chain.dd[rows] + d @ d.transpose(0, 2, 1),
     )
 
 

@@ -125,17 +125,8 @@ def _linearized(
         drift = drift + cross(turn.T, step).T + rotation @ turned[i, 3:]
         turn = turn + rotation @ turned[i, :3]
         position, rotation = position + step, rotation @ at.rotation[i]
-        errors.append(position - target.points[i + 1])
-        rows.append(drift)
-        if target.frames is not None:
-            off = rotation @ target.frames[i + 1].T
-            axial = np.array([off[2, 1] - off[1, 2], off[0, 2] - off[2, 0], off[1, 0] - off[0, 1]])
-            errors.append(target.lever * 0.5 * axial)
-            rows.append(target.lever * turn)
-        elif target.tangents is not None:
-            axis = rotation[:, 2]
-            errors.append(target.lever * (axis - target.tangents[i + 1]))
-            rows.append(target.lever * cross(turn.T, axis).T)
+        errors.append(target.errors(i + 1, rotation[None], position[None])[0])
+        rows.append(target.slopes(i + 1, rotation[None], turn.T[None], drift.T[None])[0].T)
     return np.concatenate(errors), np.concatenate(rows)
 
 

@@ -3,30 +3,31 @@
 
 Bending and twist of a segment follow from its two holes and the tension (`segments`), so the disks
 that a routing's first holes place are known before its last holes are chosen. Routings are laid
-disk by disk, and the ``width`` nearest to the wanted shape are kept. This is done at a ladder of
-tensions, from what the pull alone needs on parallel holes upwards.
+disk by disk, and the ``width`` nearest to the wanted shape are kept. This is done at some tensions,
+the likeliest first (`routing_tensions`), until one gives the shape.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 
 from .routing_chain import Chain, Target, extended, laid
+from .routing_forecast import Forecast
 from .routing_table import SegmentTable
+from .routing_tensions import likely_tensions
 from .segments import SegmentModel
 
-# A cable through parallel holes has T = pull / a^2 (EI = L = 1); crossing ones bend a rod less.
-# Measured on random routings: 0.99 to 2.1.
-_LADDER = {1: np.geomspace(1.03, 2.9, 6), 2: np.array([0.8, 1.3, 2.1])}
-_SPREAD = 0.12  # of the tension about a step of the ladder, relative
+_SPREAD = {1: 0.12, 2: 0.2}  # of the tensions about those tried, relative
+_SETTLED = 0.03  # tensions that change by less are not tried again, relative
 _NOISE = 1e-3  # of positions, units of L, against which the spread is held
 _GOOD = 1e-4  # RMS error of a disk, units of L, at which no further tensions are tried
+_MARGIN = 2  # times as many as are kept are laid exactly
 _KEPT = 24  # routings that go from one stage to the next
 _ROUNDS = 30  # of exchanges
+_AGAIN = {1: 0, 2: 4}  # routings at whose tensions is searched again, and so many times each
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,28 +52,52 @@ class RoutingSearch:
         self.target = target
         self.width = width
         self.cables = len(target.pulls)
+        self.forecast = Forecast(model, holes, target)
         self.choices = np.array(list(product(range(len(holes)), repeat=self.cables)))  # (S, C)
-        self.scale = (target.fractions + target.pulls) / model.radius**2
 
     def run(self) -> list[Found]:
         """Return the best routings found, nearest to the wanted shape first, each once."""
-        kept: list[Found] = []
-        for tensions in self._ladder():
-            kept = self._merged(kept, self._beam(self._table(tensions)))
+        kept, heads = [], []
+        for tensions in likely_tensions(self.model, self.target):
+            found = self._beam(self._table(tensions), _SPREAD[self.cables])
+            heads.append(found[0])
+            kept = self._merged(kept, found)
             if self._rms(kept) < _GOOD:
                 break
+        else:
+            kept = self._again(kept, heads)
+        return self._exchanged(kept)
+
+    def _again(self, kept: list[Found], heads: list[Found]) -> list[Found]:
+        """Search at the tensions of the best routings found, and at those that come of it."""
+        done: list[np.ndarray] = []
+        good = sorted((f for f in heads if np.isfinite(f.cost)), key=lambda f: f.cost)
+        for head in good[: _AGAIN[self.cables]]:
+            tensions = head.tensions
+            for _ in range(_AGAIN[self.cables]):
+                if any(np.abs(tensions / other - 1.0).max() < _SETTLED for other in done):
+                    break
+                done.append(tensions)
+                found = self._beam(self._table(tensions), _SETTLED)
+                kept = self._merged(kept, found)
+                if self._rms(kept) < _GOOD:
+                    return kept
+                if not np.isfinite(found[0].cost):
+                    break
+                tensions = found[0].tensions
+        return kept
+
+    def _exchanged(self, kept: list[Found]) -> list[Found]:
+        """Exchange holes of the best routing while that brings it nearer."""
         for _ in range(_ROUNDS):
             best = kept[0]
+            if not np.isfinite(best.cost):
+                break
             table = self._table(best.tensions)
-            kept = self._merged([], self._evaluated(self._around(kept), table))
+            kept = self._merged(self._evaluated(self._around(kept), table))
             if kept[0].states == best.states:
                 break
         return kept
-
-    def _ladder(self) -> Iterator[np.ndarray]:
-        steps = sorted(product(_LADDER[self.cables], repeat=self.cables), key=sum)
-        for step in steps:
-            yield self.scale * np.array(step)
 
     def _table(self, tensions: np.ndarray) -> SegmentTable:
         return SegmentTable(self.model, self.holes[self.choices], tensions)
@@ -80,22 +105,22 @@ class RoutingSearch:
     def _rms(self, found: list[Found]) -> float:
         return float(np.sqrt(max(found[0].cost, 0.0) / len(self.target.points)))
 
-    def _beam(self, table: SegmentTable) -> list[Found]:
-        states = np.arange(len(self.choices))
-        prior = np.diag((_NOISE / (_SPREAD * table.tensions)) ** 2)
-        chain = Chain.at_base(states, self.cables)
+    def _beam(self, table: SegmentTable, spread: float) -> list[Found]:
+        prior = np.diag((_NOISE / (spread * table.tensions)) ** 2)
+        chain = Chain.at_base(np.arange(len(self.choices)), self.cables)
         for _ in range(len(self.target.points) - 1):
-            rows = np.repeat(np.arange(len(chain.states)), len(states))
-            chain = extended(chain, rows, np.tile(states, len(chain.states)), table, self.target)
-            if len(chain.states) > self.width:
-                cost = chain.costs(prior)
-                chain = chain.only(np.argpartition(cost, self.width)[: self.width])
+            holes = self.choices[chain.states[:, -1]]
+            likely = self.forecast.costs(chain, holes, table.tensions, prior).ravel()
+            best = _lowest(likely, _MARGIN * self.width)
+            rows, states = np.divmod(best, len(self.choices))
+            chain = extended(chain, rows, states, table, self.target)
+            chain = chain.only(_lowest(chain.costs(prior), self.width))
         return self._found(chain, table)
 
     def _found(self, chain: Chain, table: SegmentTable) -> list[Found]:
         change, cost = chain.settled(self.target)
         tensions = table.tensions + change
-        cost = np.where((tensions > 0).all(axis=1), cost, np.inf)
+        cost = np.where((tensions > 0).all(axis=1) & np.isfinite(cost), cost, np.inf)
         best = np.argsort(cost)[:_KEPT]
         return [Found(tuple(chain.states[i].tolist()), tensions[i], float(cost[i])) for i in best]
 
@@ -131,3 +156,8 @@ class RoutingSearch:
                 some[disk:] = (some[disk:] + turn) % count
                 new.append((some @ place)[None])
         return np.unique(np.concatenate(new), axis=0)
+
+
+def _lowest(costs: np.ndarray, count: int) -> np.ndarray:
+    """Indices of the ``count`` lowest."""
+    return np.argpartition(costs, count)[:count] if count < len(costs) else np.arange(len(costs))

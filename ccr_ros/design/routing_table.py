@@ -49,19 +49,21 @@ class SegmentTable:
         self._kind = kind.reshape(-1)
         states, cables = angles.shape
         self._states = states
-        count = len(self._kinds) * states * states
-        self._solved = np.zeros(count, dtype=bool)
+        self._row: dict[int, int] = {}  # of a pair
         # One row a pair: rotation, shift, turn, drift, lengths, slack, stretch.
         self._ends = np.cumsum([9, 3, 3 * cables, 3 * cables, cables, cables, cables * cables])
-        self._rows = np.empty((count, self._ends[-1]))
+        self._rows = np.empty((0, self._ends[-1]))
 
     def pieces(self, index: int | np.ndarray, start: np.ndarray, end: np.ndarray) -> Pieces:
         """Return segments ``index`` (from the base) between states; all three are broadcast."""
         keys = (self._kind[index] * self._states + start) * self._states + end
-        missing = np.unique(keys[~self._solved[keys]])
-        if len(missing):
-            self._solve(missing)
-        rows = self._rows[keys]
+        each, which = np.unique(keys, return_inverse=True)
+        known = self._row
+        missing = [key for key in each.tolist() if key not in known]
+        if missing:
+            self._solve(np.array(missing))
+        place = np.array([known[key] for key in each.tolist()])
+        rows = self._rows[place[which.reshape(keys.shape)]]
         parts = np.split(rows, self._ends[:-1], axis=-1)
         shape, cables = keys.shape, len(self.tensions)
         forms = [(3, 3), (3,), (cables, 3), (cables, 3), (cables,), (cables,), (cables, cables)]
@@ -80,5 +82,6 @@ class SegmentTable:
         stretch = at.gradient @ change
         twists = (at.twists @ change).transpose(0, 2, 1)
         flat = [at.rotation, at.translation, twists[:, :, :3], twists[:, :, 3:], at.lengths, slack]
-        self._rows[keys] = np.concatenate([a.reshape(count, -1) for a in (*flat, stretch)], axis=1)
-        self._solved[keys] = True
+        rows = np.concatenate([a.reshape(count, -1) for a in (*flat, stretch)], axis=1)
+        self._row.update((key, len(self._rows) + i) for i, key in enumerate(keys.tolist()))
+        self._rows = np.concatenate([self._rows, rows])

@@ -115,6 +115,16 @@ class SegmentModel:
         gradient = cross(holes, spans) @ twists[:, :3] + spans @ twists[:, 3:]
         return Segments(z, rotation, translation, twists, lengths, spans, holes, gradient)
 
+    def rest_points(self) -> np.ndarray:
+        """Disk centres (n+1, 3) at rest."""
+        none = np.zeros((len(self.rest), 0))
+        at = self.evaluate(self.rest, none, none)
+        rotation, points = np.eye(3), [np.zeros(3)]
+        for turn, shift in zip(at.rotation, at.translation, strict=True):
+            points.append(points[-1] + rotation @ shift)
+            rotation = rotation @ turn
+        return np.array(points)
+
     def hessian(self, at: Segments, tensions: np.ndarray) -> np.ndarray:
         """Second derivatives (k, s, s) in y of the energy and of tensions (k, C) times lengths."""
         pull = tensions[:, :, None] * at.spans
