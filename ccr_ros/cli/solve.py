@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from ccr_ros.cli.options import integer
 from ccr_ros.model import FingerSolver, InvalidValue, Solution, SolverSettings, UnknownName
 from ccr_ros.model.files import load_finger
 from ccr_ros.resources import find_config
@@ -49,7 +50,7 @@ def run(args: argparse.Namespace) -> int:
     """Solve, print and plot; return the exit code."""
     if args.plot:
         checked_path(args.plot)  # before any work is done
-    steps, arcs = _count("--steps", args.steps, 10_000), _count("--arcs", args.arcs, 64)
+    steps, arcs = integer("--steps", args.steps, 1, 10_000), integer("--arcs", args.arcs, 1, 64)
     finger = load_finger(find_config(args.finger))
     solver = FingerSolver(finger, SolverSettings(arcs_per_segment=arcs, time_limit=_TIME_LIMIT))
     named = parse_pulls(args.pull, finger.cable_names, solver.rest_lengths)
@@ -114,16 +115,6 @@ def parse_pull(place: str, text: str) -> tuple[float, bool]:
     if not np.isfinite(value):
         raise InvalidValue(place, text, "a finite number of metres (0.007), or a percentage (4%)")
     return (value / 100 if percent else value), percent
-
-
-def _count(option: str, text: str, high: int) -> int:
-    try:
-        value = int(text)
-    except ValueError:
-        value = 0
-    if not 1 <= value <= high:
-        raise InvalidValue(option, text, f"an integer 1..{high}")
-    return value
 
 
 def _json(last: Solution, path: list[Solution]) -> dict[str, Any]:

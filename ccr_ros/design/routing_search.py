@@ -57,7 +57,8 @@ class RoutingSearch:
 
     def run(self) -> list[Found]:
         """Return the best routings found, nearest to the wanted shape first, each once."""
-        kept, heads = [], []
+        kept: list[Found] = []
+        heads: list[Found] = []
         for tensions in likely_tensions(self.model, self.target):
             found = self._beam(self._table(tensions), _SPREAD[self.cables])
             heads.append(found[0])

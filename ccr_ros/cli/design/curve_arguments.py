@@ -9,8 +9,9 @@ from ccr_ros.design.curve_files import UNITS
 from ccr_ros.design.curve_text import FAMILIES, curve_from_text
 from ccr_ros.design.curves import Curve
 from ccr_ros.design.placement import place
+from ccr_ros.design.shape_files import load_shape
 from ccr_ros.design.target import DesiredShape
-from ccr_ros.model import Finger
+from ccr_ros.model import Finger, InvalidValue
 
 #: For the docstring of a command: what a curve may be.
 CURVES_HELP = "\n".join(f"  {form}" for form in ("points.csv", *FAMILIES.values()))
@@ -47,3 +48,29 @@ def shape_from_args(args: argparse.Namespace, finger: Finger) -> DesiredShape:
             the curve; see `place`.
     """
     return place(curve_from_args(args, finger), finger)
+
+
+def add_shape_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare ``--shape`` and the curve's arguments, of which one is to be given."""
+    parser.add_argument(
+        "--shape", metavar="FILE", help="disk centres as CSV, or a pose of `ccr solve --json`"
+    )
+    add_curve_arguments(parser, required=False)
+
+
+def wanted_from_args(args: argparse.Namespace, finger: Finger, frames: bool = True) -> DesiredShape:
+    """Return the wanted shape that ``--shape`` or ``--curve`` gives.
+
+    Args:
+        frames: Whether to use the frames that a pose holds.
+
+    Raises:
+        InvalidValue, UnknownName, InvalidFile: Not one of the two is given, or as `load_shape` and
+            `shape_from_args`.
+    """
+    if (args.shape is None) == (args.curve is None):
+        given = "both" if args.shape else "neither"
+        raise InvalidValue("--shape, --curve", given, "given, one of the two")
+    if args.curve is not None:
+        return shape_from_args(args, finger)
+    return load_shape(args.shape, args.unit, frames)

@@ -21,14 +21,13 @@ import itertools
 import json
 from pathlib import Path
 
-from ccr_ros.cli.design.curve_arguments import add_curve_arguments, shape_from_args
+from ccr_ros.cli.design.curve_arguments import add_shape_arguments, wanted_from_args
+from ccr_ros.cli.options import integer, number
 from ccr_ros.cli.solve import parse_pull
 from ccr_ros.design.press import Press
 from ccr_ros.design.pull import Pull
 from ccr_ros.design.rest_report import Found, comment, print_table, to_dict
 from ccr_ros.design.rest_shape import RestShapeSolver
-from ccr_ros.design.shape_files import load_shape
-from ccr_ros.design.target import DesiredShape
 from ccr_ros.design.verify import pull_from_rest
 from ccr_ros.model import Finger, InvalidValue, UnknownName
 from ccr_ros.model.files import load_finger
@@ -42,10 +41,7 @@ _MOST_PULLS = 100  # combinations that one command designs for
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     parser.add_argument("finger", metavar="FINGER", help="finger file, or a name in config/")
-    parser.add_argument(
-        "--shape", metavar="FILE", help="disk centres as CSV, or a pose of `ccr solve --json`"
-    )
-    add_curve_arguments(parser, required=False)
+    add_shape_arguments(parser)
     parser.add_argument(
         "--pull",
         metavar="CABLE=VALUE[,VALUE]",
@@ -78,11 +74,11 @@ def run(args: argparse.Namespace) -> int:
     if args.plot:
         checked_path(args.plot)  # before any work is done
     finger = load_finger(find_config(args.finger))
-    steps = int(_number("--steps", args.steps, 1, 1000, whole=True))
+    steps = integer("--steps", args.steps, 1, 1000)
     limit = None
     if args.max_curvature is not None:
-        limit = _number("--max-curvature", args.max_curvature, 1e-6, 1e9)
-    shape = _shape(args, finger)
+        limit = number("--max-curvature", args.max_curvature, 1e-6, 1e9)
+    shape = wanted_from_args(args, finger)
     presses = [_press(word) for word in args.press]
     solver = RestShapeSolver(finger)
     found: list[Found] = []
@@ -107,13 +103,6 @@ def run(args: argparse.Namespace) -> int:
             if path:
                 print(f"{word} {path}")
     return 0 if best is not None and best.path.reached else 1
-
-
-def _shape(args: argparse.Namespace, finger: Finger) -> DesiredShape:
-    if (args.shape is None) == (args.curve is None):
-        given = "both" if args.shape else "neither"
-        raise InvalidValue("--shape, --curve", given, "given, one of the two")
-    return shape_from_args(args, finger) if args.curve else load_shape(args.shape, args.unit)
 
 
 def _pulls(words: list[str], finger: Finger) -> list[dict[str, Pull]]:
@@ -143,16 +132,5 @@ def _press(word: str) -> Press:
     if not equals or (colon and not point):
         raise InvalidValue("--press", word, "DISK=FORCE or DISK:POINT=FORCE, such as 7:cable=0.2")
     kind, _, cable = point.partition(".")
-    number = int(_number("--press", disk, 1, 1000, whole=True))
-    return Press(number, _number("--press", force, 1e-12, 1e12), kind, cable)
-
-
-def _number(option: str, text: str, low: float, high: float, whole: bool = False) -> float:
-    try:
-        value = float(int(text) if whole else float(text))
-    except ValueError:
-        value = float("nan")
-    if not low <= value <= high:
-        kind = "an integer" if whole else "a number"
-        raise InvalidValue(option, text, f"{kind} {low:g}..{high:g}")
-    return value
+    index = integer("--press", disk, 1, 1000)
+    return Press(index, number("--press", force, 1e-12, 1e12), kind, cable)

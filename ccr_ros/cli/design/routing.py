@@ -20,7 +20,8 @@ from typing import Any
 
 import numpy as np
 
-from ccr_ros.cli.design.curve_arguments import add_curve_arguments, shape_from_args
+from ccr_ros.cli.design.curve_arguments import add_shape_arguments, wanted_from_args
+from ccr_ros.cli.options import integer, number
 from ccr_ros.cli.solve import parse_pull
 from ccr_ros.design.routing import (
     MAX_CABLES,
@@ -30,21 +31,17 @@ from ccr_ros.design.routing import (
     RoutingDesign,
     design_routing,
 )
-from ccr_ros.design.shape_files import load_shape
-from ccr_ros.design.target import DesiredShape
-from ccr_ros.model import Finger, InvalidValue
+from ccr_ros.model import FingerSolver, InvalidValue
 from ccr_ros.model.files import load_finger
 from ccr_ros.model.finger_text import write_finger
 from ccr_ros.resources import find_config
+from ccr_ros.viz.figures import checked_path
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     parser.add_argument("finger", metavar="FINGER", help="finger file, or a name in config/")
-    parser.add_argument(
-        "--shape", metavar="FILE", help="disk centres as CSV, or a pose of `ccr solve --json`"
-    )
-    add_curve_arguments(parser, required=False)
+    add_shape_arguments(parser)
     parser.add_argument(
         "--pull",
         metavar="VALUE",
@@ -70,19 +67,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("-o", "--output", metavar="FILE.yaml", help="write the finger to a file")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
+    parser.add_argument("--plot", metavar="FILE.png", help="draw it (needs matplotlib)")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Search, write and print; return the exit code."""
+    """Search, write, print and plot; return the exit code."""
+    if args.plot:
+        checked_path(args.plot)  # before any work is done
     finger = load_finger(find_config(args.finger))
-    shape = _shape(args, finger)
+    shape = wanted_from_args(args, finger, frames=not args.no_frames)
     design = design_routing(
         finger,
         shape,
         _pulls(args),
         free=args.free,
-        candidates=int(_number("--candidates", args.candidates, int, 1, 20)),
-        tolerance=_number("--tolerance", args.tolerance, float, 1e-9, 1e3) / 1e3,
+        candidates=integer("--candidates", args.candidates, 1, 20),
+        tolerance=number("--tolerance", args.tolerance, 1e-9, 1e3) / 1e3,
     )
     if args.output:
         write_finger(design.best.finger, args.output, _comment(design))
@@ -90,39 +90,26 @@ def run(args: argparse.Namespace) -> int:
         print(json.dumps(_json(design)))
     else:
         _print_table(design)
-        if args.output:
-            print(f"\nwritten to {args.output}")
+    if args.plot:
+        from ccr_ros.viz.design_plot import plot_design
+
+        solver = FingerSolver(design.best.finger)
+        plot_design(args.plot, design.best.solution, shape, rest=solver.rest)
+    if not args.json:
+        for word, path in (("written to", args.output), ("drawn in", args.plot)):
+            if path:
+                print(f"{word} {path}")
     return 0 if design.reached else 1
-
-
-def _shape(args: argparse.Namespace, finger: Finger) -> DesiredShape:
-    if (args.shape is None) == (args.curve is None):
-        given = "both" if args.shape else "neither"
-        raise InvalidValue("--shape, --curve", given, "given, one of the two")
-    if args.curve is not None:
-        return shape_from_args(args, finger)
-    return load_shape(args.shape, args.unit, frames=not args.no_frames)
 
 
 def _pulls(args: argparse.Namespace) -> list[Pull]:
     if not args.pull:
         raise InvalidValue("--pull", None, "given, once for each cable: 4% or 0.0073 [m]")
     if args.cables is not None:
-        count = _number("--cables", args.cables, int, 1, MAX_CABLES)
+        count = integer("--cables", args.cables, 1, MAX_CABLES)
         if count != len(args.pull):
             raise InvalidValue("--pull", args.pull, f"given once for each of {count} cables")
     return [Pull(*parse_pull("--pull", text)) for text in args.pull]
-
-
-def _number(option: str, text: str, kind: type, low: float, high: float) -> Any:
-    try:
-        value = kind(text)
-    except ValueError:
-        value = None
-    if value is None or not low <= value <= high:
-        what = "an integer" if kind is int else "a number"
-        raise InvalidValue(option, text, f"{what} {low:g}..{high:g}")
-    return value
 
 
 def _comment(design: RoutingDesign) -> str:
