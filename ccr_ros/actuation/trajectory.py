@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import math
 
+_NEAR = 1e-12  # what is nearer is there
+
 
 class Trajectory:
     """The time-optimal way of a double integrator to rest at a target, sampled.
@@ -42,6 +44,9 @@ class Trajectory:
     def step(self, dt: float) -> float:
         """Go on for a time dt >= 0 and return the position."""
         a, v, way = self._acceleration, self.velocity, self.target - self.position
+        if v == 0.0 and abs(way) < _NEAR:
+            self.reset(self.target)
+            return self.position
         ahead = way - self._stopping_distance()
         # Which way to accelerate first. Where braking leads right to the target, rounding must not
         # decide for a last swing to and fro: the way to go is then the one in which it moves.
