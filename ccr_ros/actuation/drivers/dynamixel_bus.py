@@ -16,6 +16,11 @@ from ..driver import BusLost, DriverError
 # What a serial port raises when it goes; pyserial's own errors are OSErrors.
 _PORT_ERRORS = (OSError, termios.error)
 
+_ATTEMPTS = 3
+
+# s; the SDK polls for answers, and would keep the processor busy with reads that do not wait.
+_READ_SLICE = 0.002
+
 _ALERT = 0x80  # of a status: the servo has a hardware error, which a register tells
 
 
@@ -87,6 +92,7 @@ class DynamixelBus:
         port.baudrate = self._baud_rate
         try:
             port.openPort()
+            port.ser.timeout = _READ_SLICE
         except _PORT_ERRORS as error:
             raise BusLost(f"{self._name} cannot be opened: {_reason(error)}") from None
         self._port = port
@@ -102,7 +108,7 @@ class DynamixelBus:
 
     def ping(self, servo: int) -> None:
         """Raise BusLost unless a servo answers."""
-        _, result, _ = self._call(self._packets.ping, servo)
+        _, result, _ = self._persist(self._packets.ping, servo)
         self._check(servo, result, 0, "does not answer")
 
     def reboot(self, servo: int) -> None:
@@ -117,7 +123,7 @@ class DynamixelBus:
             BusLost: There is no answer, or none that can be read.
             DriverError: The servo refuses.
         """
-        data, result, error = self._call(
+        data, result, error = self._persist(
             self._packets.readTxRx, servo, register.address, register.size
         )
         self._check(servo, result, error, register.name)
@@ -127,7 +133,7 @@ class DynamixelBus:
 
     def put(self, servo: int, register: Register, value: int) -> None:
         """Write a register of a servo, which confirms it; errors as for `get`."""
-        result, error = self._call(
+        result, error = self._persist(
             self._packets.writeTxRx, servo, register.address, register.size, register.data(value)
         )
         self._check(servo, result, error, register.name)
@@ -149,11 +155,11 @@ class DynamixelBus:
         found: list[Callable[[Register], int]] = []
         for servo in self.ids:
             data = list(group.data_dict[servo])
-            if result != self._sdk.COMM_SUCCESS or len(data) != length:
-                # Those after the first that fails are not asked any more.
-                failure = self._packets.getTxRxResult(result).partition("]")[2].strip()
-                raise BusLost(f"servo {servo} at {self._name}: {failure or 'answer cut short'}")
+            if len(data) != length:  # those after the first that fails are not heard any more
+                raise BusLost(f"servo {servo} at {self._name}: {self._failure(result)}")
             found.append(_reader(first, data))
+        if result != self._sdk.COMM_SUCCESS:
+            raise BusLost(f"{self._name}: {self._failure(result)}")
         return found
 
     def put_all(self, register: Register, values: Sequence[int]) -> None:
@@ -179,6 +185,18 @@ class DynamixelBus:
     def _call(self, function: Callable[..., Any], *args: Any) -> Any:
         return self._guard(function, self._open_port, *args)
 
+    def _persist(self, function: Callable[..., Any], *args: Any) -> Any:
+        """Call until there is an answer, a few times: one may get lost on any bus."""
+        for _ in range(_ATTEMPTS):
+            answer = self._call(function, *args)
+            if answer[-2] == self._sdk.COMM_SUCCESS:
+                break
+        return answer
+
+    def _failure(self, result: int) -> str:
+        text = self._packets.getTxRxResult(result).partition("]")[2].strip()
+        return text if result != self._sdk.COMM_SUCCESS else "answer cut short"
+
     def _guard(self, function: Callable[..., Any], *args: Any) -> Any:
         try:
             return function(*args)
@@ -187,8 +205,7 @@ class DynamixelBus:
 
     def _check(self, servo: int, result: int, error: int, what: str) -> None:
         if result != self._sdk.COMM_SUCCESS:
-            text = self._packets.getTxRxResult(result).partition("]")[2].strip()
-            raise BusLost(f"servo {servo} at {self._name}: {what}: {text}")
+            raise BusLost(f"servo {servo} at {self._name}: {what}: {self._failure(result)}")
         if error & ~_ALERT:
             text = self._packets.getRxPacketError(error & ~_ALERT).partition("]")[2].strip()
             raise DriverError(f"servo {servo} at {self._name}: {what}: {text}")
