@@ -11,6 +11,7 @@ it joins it, so that nothing jumps there. Of all joins the one is taken whose le
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -130,7 +131,12 @@ class LeadIn:
 
 
 def contour(
-    name: str, length: float, section: Section, clearance: float, join: float | None = None
+    name: str,
+    length: float,
+    section: Section,
+    clearance: float,
+    join: float | None = None,
+    accept: Callable[[LeadIn], bool] | None = None,
 ) -> PlanarCurve:
     """Return the curve that leads to an object's contour and follows it to the curve's end.
 
@@ -141,6 +147,7 @@ def contour(
         clearance: Between the section and the backbone, the disks' radius included [m].
         join: Where on the contour the lead-in ends, counted along it from the middle of the side
             that faces the base, upwards [m]; ``None``: where it bends least.
+        accept: What else a lead-in must satisfy if no join is given.
 
     Raises:
         InvalidValue: The base is on or in the contour, no smooth lead-in outside of the contour
@@ -148,15 +155,7 @@ def contour(
     """
     length = checks.real("length", length, above=0, high=1e3, unit="m")
     wanted = section.grown(checks.real("clearance", clearance, above=0, high=1e3, unit="m"))
-    depth = -float(wanted.signed_distance(np.zeros((1, 2)))[0])
-    if depth >= 0:
-        raise InvalidValue(
-            "base",
-            [0.0, 0.0],
-            f"outside of the contour, {clearance * 1e3:.4g} mm off the object"
-            f" (it is {depth * 1e3:.4g} mm inside)",
-        )
-    lead = lead_in(wanted, join) if join is not None else least_lead_in(wanted)
+    lead = lead_in(wanted, join) if join is not None else least_lead_in(wanted, accept)
     return follow(name, length, wanted, lead)
 
 
@@ -193,6 +192,7 @@ def lead_in(wanted: Section, join: float) -> LeadIn:
     Raises:
         InvalidValue: None leads there, or it passes through the contour, saying how deep.
     """
+    _check_base(wanted)
     reach = wanted.core[1] + wanted.corner_radius * _STEEPEST
     join = checks.real("join", join, low=-reach, high=reach, unit="m")
     lead = _solved(wanted, join, None)
@@ -209,26 +209,31 @@ def lead_in(wanted: Section, join: float) -> LeadIn:
     return lead
 
 
-def least_lead_in(wanted: Section, low: float = -math.inf, high: float = math.inf) -> LeadIn:
+def least_lead_in(wanted: Section, accept: Callable[[LeadIn], bool] | None = None) -> LeadIn:
     """Return the lead-in that bends least (integral of squared curvature), outside of the contour.
 
     Args:
         wanted: The contour.
-        low: Least position of the join [m]; see `Section.knots`.
-        high: Largest position of the join [m].
+        accept: What else it must satisfy.
 
     Raises:
         InvalidValue: There is none.
     """
+
+    def tried(join: float, guess: LeadIn | None) -> tuple[LeadIn | None, bool]:
+        lead = _outside(wanted, join, guess)
+        return lead, lead is not None and abs(join) <= reach and (not accept or accept(lead))
+
+    _check_base(wanted)
     reach = wanted.core[1] + wanted.corner_radius * _STEEPEST
-    joins = np.linspace(max(-reach, low), min(reach, high), _JOINS)
-    found: list[LeadIn | None] = []
+    joins = np.linspace(reach, -reach, _JOINS)
+    found: list[LeadIn] = []
     last: LeadIn | None = None
-    for join in joins[::-1]:  # from above: there the lead-in is longest and bends gently
-        last = _outside(wanted, float(join), last)
-        found.append(last)
-    best = min((x for x in found if x is not None), key=lambda x: x.bending, default=None)
-    if best is None:
+    for join in joins:  # from above: there the lead-in is longest and bends gently
+        last, good = tried(float(join), last)
+        if last is not None and good:
+            found.append(last)
+    if not found:
         raise InvalidValue(
             "base",
             [0.0, 0.0],
@@ -236,13 +241,24 @@ def least_lead_in(wanted: Section, low: float = -math.inf, high: float = math.in
             f" {wanted.forward * 1e3:.4g} mm in front and {wanted.up * 1e3:.4g} mm up, its side"
             f" {(wanted.forward - wanted.half_width) * 1e3:.4g} mm in front)",
         )
-    step = float(joins[1] - joins[0]) / 2
-    for _ in range(_REFINEMENTS):  # a parabola's minimum, bracketed by halving steps
-        near = [_outside(wanted, best.join + d, best) for d in (-step, step)]
-        inside = [x for x in near if x is not None and low <= x.join <= high]
-        best = min([best, *inside], key=lambda x: x.bending)
+    best = min(found, key=lambda x: x.bending)
+    step = float(joins[0] - joins[1]) / 2
+    for _ in range(_REFINEMENTS):  # by ever smaller steps to either side
+        near = [tried(best.join + d, best) for d in (-step, step)]
+        best = min([best, *(x for x, good in near if x and good)], key=lambda x: x.bending)
         step /= 2
     return best
+
+
+def _check_base(wanted: Section) -> None:
+    depth = -float(wanted.signed_distance(np.zeros((1, 2)))[0])
+    if depth >= 0:
+        raise InvalidValue(
+            "base",
+            [0.0, 0.0],
+            "outside of the contour, the object and the way to be kept from it (it is"
+            f" {depth * 1e3:.4g} mm inside)",
+        )
 
 
 def _outside(wanted: Section, join: float, guess: LeadIn | None) -> LeadIn | None:

@@ -95,6 +95,7 @@ def _draw_errors(axes: Any, errors: np.ndarray) -> None:
     from matplotlib.ticker import MaxNLocator
 
     shown = np.maximum(errors[1:] * MM, _SMALLEST)
+    below = f" (drawn from {_SMALLEST:g} on)" if shown.min() == _SMALLEST else ""
     disks = np.arange(1, len(errors))
     low = 10.0 ** np.floor(np.log10(shown.min()) - 0.5)
     axes.vlines(disks, low, shown, color=palette.WANTED, lw=2, alpha=0.6)
@@ -105,7 +106,7 @@ def _draw_errors(axes: Any, errors: np.ndarray) -> None:
     axes.set_xlabel("disk", fontsize=9)
     total = float(np.sum((errors * MM) ** 2))
     axes.set_title(
-        f"distance from the wanted centre [mm]\nsum of squares {total:.2g} mm²",
+        f"distance from the wanted centre [mm]{below}\nsum of squares {total:.2g} mm²",
         fontsize=9.5,
         color="#4a5568",
     )

@@ -125,9 +125,12 @@ def test_at_three_percent_the_gripper_lies_on_the_sphere():
         disks = mounted.base.points(solution.backbone)
         distances = np.linalg.norm(disks - center, axis=1)
         # The disks' rims touch: their centres are the sphere's radius and the disk's away.
-        np.testing.assert_allclose(distances[5:], 0.056 + 0.008, atol=0.5e-3)
+        np.testing.assert_allclose(distances[5:], 0.056 + 0.008, atol=1e-8)
         # The sphere must fit between the fingers: no disk centre comes nearer than that.
-        assert distances.min() > 0.056 + 0.008 - 0.5e-3
+        assert distances.min() > 0.056 + 0.008 - 1e-8
+        # It is held: some disks touch below its equator, and some above.
+        heights = disks[5:, 2] - center[2]
+        assert heights.min() < -0.01 and heights.max() > 0.05
 
 
 def test_an_unpulled_gripper_is_open():

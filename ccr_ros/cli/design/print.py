@@ -36,5 +36,5 @@ def run(args: argparse.Namespace) -> int:
     """Write the parts; return the exit code."""
     options = options_from_args(args)
     finger = load_finger(find_config(args.finger))
-    print_finger(finger, stem_of(finger.name), options, output_folder(args.out))
+    print(print_finger(finger, stem_of(finger.name), options, output_folder(args.out)))
     return 0

@@ -8,7 +8,7 @@ import re
 from pathlib import Path
 
 from ccr_ros.design.part_tables import write_tables
-from ccr_ros.design.parts import FingerParts, PrintOptions, finger_parts
+from ccr_ros.design.parts import PrintOptions, finger_parts
 from ccr_ros.design.solid import finger_solid, write_stl
 from ccr_ros.model import Finger, InvalidFile, InvalidValue
 
@@ -66,20 +66,18 @@ def output_folder(path: str) -> Path:
     return folder
 
 
-def print_finger(finger: Finger, stem: str, options: PrintOptions, folder: Path) -> FingerParts:
-    """Write tables and solid of a finger, and tell what was written; return its parts."""
+def print_finger(finger: Finger, stem: str, options: PrintOptions, folder: Path) -> str:
+    """Write tables and solid of a finger, and return what was written, for people."""
     parts = finger_parts(finger, options)
     solid = finger_solid(parts)
     paths = [*write_tables(parts, folder, stem), write_stl(solid, folder / f"{stem}.stl")]
     size = (solid.vertices.max(axis=0) - solid.vertices.min(axis=0)).round(1)
-    print(
-        f"{finger.name}: {len(parts.disks)} disks of {2e3 * parts.outer_radius:g} mm,"
+    head = (
+        f"{stem}: {len(parts.disks)} disks of {2e3 * parts.outer_radius:g} mm,"
         f" {len(parts.holes)} holes; {solid.volume / 1e3:.2f} cm3 within"
         f" {size[0]:g} x {size[1]:g} x {size[2]:g} mm"
     )
-    for path in paths:
-        print(f"  {path}")
-    return parts
+    return "\n".join([head, *(f"  {path}" for path in paths)])
 
 
 def stem_of(name: str) -> str:
