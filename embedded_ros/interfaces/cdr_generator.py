@@ -83,7 +83,6 @@ class Generator(ABC):
         self.modulus, self.residue = 8, 0
         self.group: list[str] = []
         self.group_format = ""
-        self.group_start = 0
         self.count = 0
 
     def name(self, stem: str) -> str:

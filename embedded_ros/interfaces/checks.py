@@ -145,7 +145,7 @@ def _collection_check(ftype: FieldType, classes: Classes) -> Check:
             if value.size != size:
                 raise AssertionError(f"The '{name}' numpy.ndarray() must have a size of {size}")
             return value
-        return np.array(list(check(value, name)), dtype=kind)
+        return np.array(check(value, name), dtype=kind)
 
     return check_sequence if ftype.kind == "sequence" else check_array
 

@@ -3,9 +3,8 @@
 
 from __future__ import annotations
 
-import re
-
 from .exceptions import InvalidServiceNameException, InvalidTopicNameException
+from .impl.names import check_absolute_name
 
 
 def validate_full_topic_name(name: str, *, is_service: bool = False) -> bool:
@@ -18,24 +17,5 @@ def validate_full_topic_name(name: str, *, is_service: bool = False) -> bool:
         kind = InvalidServiceNameException if is_service else InvalidTopicNameException
         raise kind(name, text, index)
 
-    if not name:
-        fail("topic name must not be empty", 0)
-    if not name.startswith("/"):
-        fail("topic name must be absolute, it must lead with a '/'", 0)
-    if name.endswith("/"):
-        fail("topic name must not end with a '/'", len(name) - 1)
-    bad = re.search(r"[^A-Za-z0-9_/]", name)
-    if bad:
-        fail(
-            "topic name must not contain characters other than alphanumerics, '_', or '/'",
-            bad.start(),
-        )
-    repeated = name.find("//")
-    if repeated >= 0:
-        fail("topic name must not contain repeated '/'", repeated + 1)
-    digit = re.search(r"/\d", name)
-    if digit:
-        fail("topic name must not have a token that starts with a number", digit.start() + 1)
-    if len(name) > 247:
-        fail("topic name should not exceed 247 characters", 246)
+    check_absolute_name(name, "topic name", fail, ending="", limit=247)
     return True

@@ -90,6 +90,33 @@ def _enter_domain(domain_id: int) -> TypesOfDomain:
     return known[2]
 
 
+# The binding's getter of each status, and the member of what it gives that is the detail.
+_WRITER_STATUSES = {
+    "matched": ("get_publication_matched_status", "current_count"),
+    "incompatible_qos": ("get_offered_incompatible_qos_status", "last_policy_id"),
+    "deadline": ("get_offered_deadline_missed_status", ""),
+    "liveliness": ("get_liveliness_lost_status", ""),
+}
+_READER_STATUSES = {
+    "matched": ("get_subscription_matched_status", "current_count"),
+    "incompatible_qos": ("get_requested_incompatible_qos_status", "last_policy_id"),
+    "deadline": ("get_requested_deadline_missed_status", ""),
+    "liveliness": ("get_liveliness_changed_status", ""),
+    "lost": ("get_sample_lost_status", ""),
+}
+
+
+def _status(end: Any, source: tuple[str, str]) -> StatusChange:
+    """Read and reset a status of a writer or reader, which may be closed."""
+    getter, detail = source
+    if end is None:
+        return StatusChange(0, 0)
+    told = getattr(end, getter)()
+    return StatusChange(
+        told.total_count, told.total_count_change, getattr(told, detail) if detail else 0
+    )
+
+
 class _Peers:
     """User data of matched endpoints, read once each: reading it back is slow in the binding."""
 
@@ -158,20 +185,7 @@ class CycloneWriter(Writer):
             raise DDSException(result, "while asserting liveliness")
 
     def status(self, kind: str) -> StatusChange:
-        writer = self._writer
-        if writer is None:
-            return StatusChange(0, 0)
-        if kind == "matched":
-            told = writer.get_publication_matched_status()
-            return StatusChange(told.total_count, told.total_count_change, told.current_count)
-        if kind == "incompatible_qos":
-            told = writer.get_offered_incompatible_qos_status()
-            return StatusChange(told.total_count, told.total_count_change, told.last_policy_id)
-        if kind == "deadline":
-            told = writer.get_offered_deadline_missed_status()
-        else:
-            told = writer.get_liveliness_lost_status()
-        return StatusChange(told.total_count, told.total_count_change)
+        return _status(self._writer, _WRITER_STATUSES[kind])
 
     def close(self) -> None:
         with uninterrupted(), _lock:
@@ -218,23 +232,11 @@ class CycloneReader(Reader):
 
     def status(self, kind: str) -> StatusChange:
         reader = self._reader
-        if reader is None:
-            return StatusChange(0, 0)
-        if kind == "matched":
-            told = reader.get_subscription_matched_status()
-            return StatusChange(told.total_count, told.total_count_change, told.current_count)
-        if kind == "incompatible_qos":
-            told = reader.get_requested_incompatible_qos_status()
-            return StatusChange(told.total_count, told.total_count_change, told.last_policy_id)
-        if kind == "liveliness":
-            told = reader.get_liveliness_changed_status()
-            change = abs(told.alive_count_change) + abs(told.not_alive_count_change)
-            return StatusChange(told.alive_count, change, told.not_alive_count)
-        if kind == "deadline":
-            told = reader.get_requested_deadline_missed_status()
-        else:
-            told = reader.get_sample_lost_status()
-        return StatusChange(told.total_count, told.total_count_change)
+        if kind != "liveliness" or reader is None:
+            return _status(reader, _READER_STATUSES[kind])
+        told = reader.get_liveliness_changed_status()
+        change = abs(told.alive_count_change) + abs(told.not_alive_count_change)
+        return StatusChange(told.alive_count, change, told.not_alive_count)
 
     def close(self) -> None:
         with uninterrupted(), _lock:

@@ -44,6 +44,7 @@ from std_msgs.msg import (
 )
 from std_srvs.srv import SetBool, Trigger
 from tf2_msgs.action import LookupTransform
+from unique_identifier_msgs.msg import UUID
 from visualization_msgs.msg import Marker, MarkerArray
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -163,6 +164,10 @@ def test_fixed_numeric_arrays_are_numpy():
     assert pose.covariance.shape == (36,)
     pose.covariance = [float(i) for i in range(36)]
     assert pose.covariance[35] == 35.0
+    with pytest.raises(ValueError, match="invalid literal"):  # NumPy takes bytes for text
+        UUID().uuid = bytes(16)
+    with pytest.raises(TypeError):
+        UUID().uuid = set(range(16))
 
 
 def test_constructors_convert_numbers():

@@ -63,7 +63,6 @@ class ActionEnd(Waitable):
             )
         self._node = node
         self._action_type = action_type
-        self._action_name = action_name
         self._logger = node.get_logger().get_child(f"action_{role}")
         self._prefix = f"{action_name}/_action/"
         self._destroyers: dict[Any, Callable[[Any], bool]] = {}

@@ -78,7 +78,6 @@ class ServiceEnd(QueuedEntity):
         (out_topic, out_type), (in_topic, in_type) = ends if role == "client" else ends[::-1]
         self._serialize = registry.serializer(out_type)
         self._deserialize = registry.deserializer(in_type)
-        self._in_type = in_type
         self._id = f"{role}id=" + ".".join(f"{byte:x}" for byte in secrets.token_bytes(16)) + ";"
         participant = node.context.participant
         self._writer = participant.create_writer(*self._arguments(out_topic, out_type))
