@@ -2,31 +2,20 @@
 """Gives every test process its own ROS graph, and rclpy, before any test module is imported."""
 
 import os
-import random
 
 import pytest
 from hypothesis import settings
 
 from ccr_ros.blas import use_one_thread
 from ccr_ros.runtime import enable_ros
-from ccr_ros.stack.environment import DOMAINS, is_free
+from ccr_ros.stack.environment import free_domain
 
 # The same examples on every machine, however slow it is.
 settings.register_profile("ccr", derandomize=True, deadline=None, max_examples=25)
 settings.load_profile("ccr")
 
-
-def _own_domain() -> int:
-    """Return a domain no other worker of this run takes, and that is free on this machine."""
-    worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
-    workers = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
-    mine = [domain for domain in DOMAINS if domain % workers == worker % workers]
-    random.shuffle(mine)
-    return next(domain for domain in mine if is_free(domain))
-
-
 use_one_thread()
-os.environ["ROS_DOMAIN_ID"] = str(_own_domain())
+os.environ["ROS_DOMAIN_ID"] = str(free_domain())
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 os.environ["ROS_PYTHON_CHECK_FIELDS"] = "1"  # real rclpy checks no field types by default
 enable_ros()

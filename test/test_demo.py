@@ -4,6 +4,8 @@
 import io
 import os
 import socket
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -15,7 +17,12 @@ from ccr_ros.demo.script import BALL, GRIPPER_FILE, PullScript
 from ccr_ros.model import FingerSolver, InvalidFile, InvalidValue, load_gripper
 from ccr_ros.nodes.conversions import obstacle_from_body
 from ccr_ros.resources import find_config
-from ccr_ros.stack.environment import free_domain, graph_environment, import_environment
+from ccr_ros.stack.environment import (
+    free_domain,
+    graph_environment,
+    import_environment,
+    is_free,
+)
 from ccr_ros.viz.figures import MissingMatplotlib
 
 FINGERS = ("finger_1", "finger_2", "finger_3")
@@ -208,6 +215,21 @@ def test_a_domain_in_use_is_not_taken(monkeypatch):
             "random.sample", lambda *_: [domain, *(d for d in range(1, 101) if d != domain)]
         )
         assert free_domain() != domain
+
+
+def test_a_domain_that_somebody_chose_is_not_taken_until_they_end(monkeypatch):
+    monkeypatch.setattr("random.sample", lambda domains, _: list(domains))
+    choose = "from ccr_ros.stack.environment import *; print(free_domain(), flush=True); input()"
+    env = {**os.environ, **import_environment(os.environ)}
+    command = [sys.executable, "-c", choose]
+    with subprocess.Popen(
+        command, env=env, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as other:
+        domain = int(other.stdout.readline())
+        assert not is_free(domain)
+        assert free_domain() != domain
+        other.communicate("\n")
+    assert is_free(domain)
 
 
 def test_children_import_this_package():

@@ -14,6 +14,10 @@ import ccr_ros
 # Higher domains' ports reach into the range that systems give to outgoing connections.
 DOMAINS = range(1, 101)
 _PROBED = 10  # participants
+# A port that would be the 120th participant's says that somebody has chosen the domain, and not
+# entered it yet or again: demos and tests that start at the same moment stay apart.
+_MARK = 249
+_marks: list[socket.socket] = []
 
 
 def graph_environment(environ: Mapping[str, str]) -> dict[str, str]:
@@ -33,19 +37,46 @@ def import_environment(environ: Mapping[str, str]) -> dict[str, str]:
 
 
 def free_domain() -> int:
-    """Return a ROS domain, chosen by chance, that nobody on this machine seems to be in."""
+    """Return a ROS domain, chosen by chance, that nobody on this machine seems to be in.
+
+    It stays marked until this process ends, so that others who ask do not get it.
+    """
     domains = random.sample(DOMAINS, len(DOMAINS))
-    return next(filter(is_free, domains), domains[0])
+    for domain in domains:
+        mark = _bind(domain, _MARK)
+        if mark is None:
+            continue
+        if _is_empty(domain):
+            _marks.append(mark)
+            return domain
+        mark.close()
+    return domains[0]
 
 
 def is_free(domain: int) -> bool:
-    """Tell whether nobody on this machine seems to be in a ROS domain."""
+    """Tell whether nobody on this machine seems to be in a ROS domain, or to have chosen it."""
+    return _is_unbound(domain, _MARK) and _is_empty(domain)
+
+
+def _is_empty(domain: int) -> bool:
     # The participants of a domain take these ports in turn (DDSI-RTPS 2.5, section 9.6.1); the
     # first of them may have left.
-    for participant in range(_PROBED):
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-            try:
-                probe.bind(("", 7400 + 250 * domain + 10 + 2 * participant))
-            except OSError:
-                return False
-    return True
+    return all(_is_unbound(domain, 10 + 2 * participant) for participant in range(_PROBED))
+
+
+def _is_unbound(domain: int, offset: int) -> bool:
+    bound = _bind(domain, offset)
+    if bound is not None:
+        bound.close()
+    return bound is not None
+
+
+def _bind(domain: int, offset: int) -> socket.socket | None:
+    """Return a socket at one of a domain's 250 ports, None where it is taken."""
+    bound = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    try:
+        bound.bind(("", 7400 + 250 * domain + offset))
+    except OSError:
+        bound.close()
+        return None
+    return bound
