@@ -17,7 +17,6 @@ _PROBED = 10  # participants
 # A port that would be the 120th participant's says that somebody has chosen the domain, and not
 # entered it yet or again: demos and tests that start at the same moment stay apart.
 _MARK = 249
-_marks: list[socket.socket] = []
 
 
 def graph_environment(environ: Mapping[str, str]) -> dict[str, str]:
@@ -47,7 +46,7 @@ def free_domain() -> int:
         if mark is None:
             continue
         if _is_empty(domain):
-            _marks.append(mark)
+            mark.detach()  # stays open until the process ends
             return domain
         mark.close()
     return domains[0]
