@@ -95,6 +95,7 @@ setup(
     entry_points={
         "console_scripts": [
             "ccr = ccr_ros.cli.main:main",
+            "gripper_coordinator_node = ccr_ros.nodes.entry:gripper_coordinator_node",
             "servo_bridge_node = ccr_ros.nodes.entry:servo_bridge_node",
             "solver_node = ccr_ros.nodes.entry:solver_node",
         ],

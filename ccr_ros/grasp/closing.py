@@ -78,8 +78,9 @@ class Closing:
             self._move(finger, seconds)
         if self.phase == APPROACH and self._all_touch():
             self.phase = PRESS
-            least = min(self._grip.force(finger) for finger in self._grip.needed)
-            self._target = min(self._goal.force, max(self._target, least))
+            if self._grip.committed:  # what was held before is not pressed less now
+                least = min(self._grip.force(finger) for finger in self._grip.needed)
+                self._target = min(self._goal.force, max(self._target, least))
         if self.phase == PRESS:
             self._raise_target(seconds)
         return self._verdict(now)
@@ -94,12 +95,12 @@ class Closing:
             limit = max(self.limit(finger), finger.place)
             advance(finger, limit, self._speed(finger), seconds, self._settings.max_lead)
             return
-        if finger.name not in self._touching:
-            self._touching.add(finger.name)
-            self._grip.touch(finger)
-            if not self._grip.committed:
-                # The command was ahead of the pose that touched: what it is ahead by would press.
-                finger.place = min(finger.place, finger.solved_place)
+        begins = finger.name not in self._touching
+        self._touching.add(finger.name)
+        self._grip.touch(finger, begins)
+        if begins and not self._grip.committed:
+            # The command was ahead of the pose that touched: what it is ahead by would press.
+            finger.place = min(finger.place, finger.solved_place)
         # What was held before must not be pressed less while others still come.
         target = self._target
         if self._grip.committed:
@@ -115,6 +116,9 @@ class Closing:
 
     def _raise_target(self, seconds: float) -> None:
         forces = [self._grip.force(f) for f in self._grip.needed if not self._at_limit(f)]
+        ahead = max(forces, default=0.0) > self._target + self._settings.force_tolerance
+        if ahead and not self._grip.committed:
+            return  # who ran on while it touched comes back first
         target = self._target + self._settings.press_rate * seconds
         if forces:
             target = min(target, max(self._target, min(forces) + _PRESS_LEAD))

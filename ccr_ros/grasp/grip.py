@@ -70,10 +70,17 @@ class Grip:
 
     # What is done
 
-    def touch(self, finger: FingerControl) -> None:
-        """Note where a finger began to touch; a committed floor stays."""
-        if not self.committed or finger.name not in self.floors:
-            self.floors[finger.name] = min(finger.place, finger.solved_place)
+    def touch(self, finger: FingerControl, begins: bool) -> None:
+        """Note where a finger touches: its floor is the least place since it began.
+
+        A committed floor stays.
+        """
+        if self.committed and finger.name in self.floors:
+            return
+        place = finger.solved_place
+        if not begins:
+            place = min(place, self.floors.get(finger.name, place))
+        self.floors[finger.name] = place
 
     def commit(self, force: float | None) -> None:
         """Hold from now on: with this target [N], or each finger with the force it has."""

@@ -30,6 +30,11 @@ def servo_bridge_node() -> int:
     return _run("servo_bridge_node", "ServoBridgeNode")
 
 
+def gripper_coordinator_node() -> int:
+    """Run the coordinator; arguments are in ``sys.argv``. Returns the exit code."""
+    return _run("gripper_coordinator_node", "GripperCoordinatorNode")
+
+
 def _run(module: str, node: str) -> int:
     """Run the node of a class in a module of this package; both are imported here."""
     end_on_signals()

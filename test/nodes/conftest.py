@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 import rclpy
+from gripper_stack import GripperStack
 from probe import Probe
 from rclpy.context import Context
 from rclpy.parameter import Parameter
@@ -42,6 +43,20 @@ def start(context: Context, probe: Probe) -> Callable[..., SolverNode]:
         return probe.add(node)
 
     return start
+
+
+@pytest.fixture
+def stack(context: Context, probe: Probe) -> Iterator[Callable[..., GripperStack]]:
+    """Return a function that starts a gripper's nodes; values are the coordinator's parameters."""
+    started = []
+
+    def start(at: float = 0.0, **values: Any) -> GripperStack:
+        started.append(GripperStack(context, probe, at, **values))
+        return started[-1]
+
+    yield start
+    for stack in started:
+        stack.close()
 
 
 @pytest.fixture
