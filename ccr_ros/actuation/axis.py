@@ -78,7 +78,7 @@ class CableAxis:
         """Take what the servo at this place says, a time dt [s] after the last."""
         self.angle, self.velocity = float(reading.angles[index]), float(reading.velocities[index])
         self.temperature = float(reading.temperatures[index])
-        self.torque = float(reading.efforts[index]) * self.joint.torque_per_effort
+        self.torque = float(reading.efforts[index])
         self._error = reading.errors[index]
         self.raw_tension = self.transmission.tension(self.torque)
         if math.isfinite(self.tension) and math.isfinite(self.raw_tension):

@@ -30,7 +30,7 @@ class ServoReading:
     Attributes:
         angles: [rad].
         velocities: [rad/s].
-        efforts: In the driver's unit, see `ServoJoint.torque_per_effort`.
+        efforts: Torques at the servos' shafts [N m].
         temperatures: [degC].
         errors: Errors that the servos report themselves, in words; empty: none.
     """

@@ -32,11 +32,11 @@ class ServoJoint:
         max_tension: More is a fault [N].
         max_temperature: More is a fault [degC].
         tolerance: Distance between setpoint and measured pull that is not worth a word [m].
-        torque_per_effort: Torque at the servo's shaft [N m] per unit of effort that the driver
-            reads: 1 where it reads N m, the torque constant where it reads A.
         efficiency: Of gear and spool, 0 to 1: how much of the torque reaches the cable.
         id: The servo's number on its bus, where there is one.
         current_limit: Largest current of the servo [A], where the driver can set it.
+        torque_constant: Torque at the servo's shaft per current [N m/A], for drivers that read
+            currents; None: they know no effort.
 
     Raises:
         InvalidValue: A value is out of its range.
@@ -55,10 +55,10 @@ class ServoJoint:
     cable_stiffness: float = math.inf
     max_temperature: float = 70.0
     tolerance: float = 0.001
-    torque_per_effort: float = 1.0
     efficiency: float = 1.0
     id: int | None = None
     current_limit: float | None = None
+    torque_constant: float | None = None
 
     def __post_init__(self) -> None:
         def keep(key: str, value: Any) -> None:
@@ -85,12 +85,13 @@ class ServoJoint:
             real("cable_stiffness", low=1.0, unit="N/m")
         real("max_temperature", low=0.0, high=200.0, unit="degC")
         real("tolerance", low=1e-6, high=0.1, unit="m")
-        real("torque_per_effort", low=1e-6, high=1e3)
         real("efficiency", low=0.01, high=1.0)
         if self.id is not None:
             keep("id", checks.integer("id", self.id, low=0, high=252))
         if self.current_limit is not None:
             real("current_limit", low=0.001, high=100.0, unit="A")
+        if self.torque_constant is not None:
+            real("torque_constant", low=1e-6, high=1e3, unit="N m/A")
 
     @property
     def name(self) -> str:

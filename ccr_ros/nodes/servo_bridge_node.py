@@ -35,8 +35,9 @@ from .servo_diagnostics import ServoDiagnostics
 from .servo_topics import ServoTopics
 
 _STATE_RATE = 10.0  # Hz, at most; changes are told at once
-_HEARTBEAT = 0.4  # s, by the steady clock: also where simulated time stands still
+_HEARTBEAT = 0.4  # s, also where simulated time stands still
 _DIAGNOSTICS_PERIOD = 1.0  # s
+_SHORTEST_REPORT = 0.1  # s between diagnostics on refused commands
 
 
 class ServoBridgeNode(LifecycleNode):
@@ -72,7 +73,9 @@ class ServoBridgeNode(LifecycleNode):
         self._cycles = 0
         self._told: tuple[object, ...] = ()  # what was last told of the state
         self._starting = fixed.autostart
-        self._topics = ServoTopics(self, fixed, self._report)
+        self._steady = Clock(clock_type=ClockType.STEADY_TIME)  # as sim time may stand still
+        self._reported_at = self._steady.now()
+        self._topics = ServoTopics(self, fixed, self._refused)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", DIAGNOSTICS)
         self._health = ServoDiagnostics(self.get_fully_qualified_name(), fixed.rack.name)
         self._level: bytes | None = None
@@ -87,9 +90,8 @@ class ServoBridgeNode(LifecycleNode):
         self.add_on_set_parameters_callback(self._check_parameters)
         self.add_post_set_parameters_callback(self._parameters_changed)
 
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(_HEARTBEAT, self._tell, clock=steady)
-        self.create_timer(_DIAGNOSTICS_PERIOD, self._report, clock=steady)
+        self.create_timer(_HEARTBEAT, self._tell, clock=self._steady)
+        self.create_timer(_DIAGNOSTICS_PERIOD, self._report, clock=self._steady)
         if fixed.autostart:
             self._start()
         self._tell()
@@ -196,7 +198,9 @@ class ServoBridgeNode(LifecycleNode):
                 fixed.rack, settings, fixed.seed, state_file=fixed.state_file or None
             )
         if fixed.driver == Ros2ControlDriver.name:
-            return Ros2ControlDriver(fixed.rack, self._topics.send, fixed.settings.bus_timeout)
+            return Ros2ControlDriver(
+                fixed.rack, self._topics.send, fixed.settings.bus_timeout, fixed.torque_per_effort
+            )
         from ccr_ros.actuation.drivers.dynamixel import DynamixelDriver
 
         return DynamixelDriver(
@@ -250,8 +254,14 @@ class ServoBridgeNode(LifecycleNode):
             self._report()
         self._topics.publish_state(self.get_clock().now().to_msg(), self._failure)
 
+    def _refused(self) -> None:
+        """Tell of a refused command at once, but not of each of a flood."""
+        if (self._steady.now() - self._reported_at).nanoseconds * 1e-9 >= _SHORTEST_REPORT:
+            self._report()
+
     def _report(self) -> None:
         """Publish diagnostics."""
+        self._reported_at = self._steady.now()
         status = self._health.status(self._bridge, self._topics, self._failure)
         header = Header(stamp=self.get_clock().now().to_msg())
         self._diagnostics.publish(DiagnosticArray(header=header, status=[status]))

@@ -41,6 +41,7 @@ class ServoParameters:
         calibration_file: Where zeros are kept.
         seed: Of the simulated servos' noise.
         state_file: Where simulated servos keep their angles; empty: nowhere.
+        torque_per_effort: Of efforts in joint states; see `Ros2ControlDriver`.
         port, baud_rate, watchdog, current_unit: Of the Dynamixel bus; see `DynamixelDriver`.
     """
 
@@ -53,6 +54,7 @@ class ServoParameters:
     calibration_file: Path
     seed: int
     state_file: str
+    torque_per_effort: float
     port: str
     baud_rate: int
     watchdog: float
@@ -99,6 +101,12 @@ def declare(node: Node) -> ServoParameters:
         "File that simulated servos keep their angles in, as real ones keep theirs when the "
         "node dies; empty: none.",
     )
+    torque_per_effort = own.fixed(
+        "ros2_control.torque_per_effort",
+        1.0,
+        "Torque at a servo's shaft per unit of effort in its joint state [N m].",
+        (1e-6, 1e6),
+    )
     port = own.fixed("dynamixel.port", "/dev/ttyUSB0", "Serial port of the Dynamixel bus.")
     baud_rate = own.fixed(
         "dynamixel.baud_rate",
@@ -141,6 +149,7 @@ def declare(node: Node) -> ServoParameters:
         ),
         seed=seed,
         state_file=state_file,
+        torque_per_effort=torque_per_effort,
         port=port,
         baud_rate=baud_rate,
         watchdog=watchdog,

@@ -38,8 +38,10 @@ COUNT = 2 * math.pi / 4096  # rad
 PAIR = ServoRack(
     "pair",
     tuple(
-        replace(joint, id=servo, current_limit=limit, torque_per_effort=1.8)
-        for joint, servo, limit in zip(rack().joints, (1, 7), (0.5, None), strict=True)
+        replace(joint, id=servo, current_limit=limit, torque_constant=torque)
+        for joint, servo, limit, torque in zip(
+            rack().joints, (1, 7), (0.5, None), (2.0, None), strict=True
+        )
     ),
 )
 
@@ -102,7 +104,7 @@ def test_reads_and_writes(servos, driver):
     servos[1].put(VELOCITY, 10)
     servos[7].put(TEMPERATURE, 55)
     reading = driver.read(0.1)
-    assert reading.efforts.tolist() == pytest.approx([-0.269, 0.0])
+    assert reading.efforts.tolist() == pytest.approx([-0.538, math.nan], nan_ok=True)
     assert reading.velocities[0] == pytest.approx(10 * 0.229 * 2 * math.pi / 60)
     assert reading.temperatures.tolist() == [30.0, 55.0]
     assert reading.errors == ("", "")

@@ -16,9 +16,9 @@ from ccr_ros.model import InvalidValue
 PAIR = rack()
 
 
-def driver():
+def driver(**options):
     sent = []
-    made = Ros2ControlDriver(PAIR, sent.append, timeout=0.2)
+    made = Ros2ControlDriver(PAIR, sent.append, timeout=0.2, **options)
     made.open()
     return made, sent
 
@@ -34,6 +34,12 @@ def test_joints_are_found_by_name(names):
     assert reading.velocities.tolist() == [10.0, 20.0]
     assert reading.efforts.tolist() == [100.0, 200.0]
     assert np.all(np.isnan(reading.temperatures))
+
+
+def test_efforts_may_be_of_another_unit():
+    servos, _ = driver(torque_per_effort=0.5)
+    servos.take(PAIR.names, [1.0, 2.0], [], [3.0, 4.0], 1.0)
+    assert servos.read(1.0).efforts.tolist() == [1.5, 2.0]
 
 
 def test_joints_of_several_publishers_each_have_their_age():

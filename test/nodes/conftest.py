@@ -13,7 +13,9 @@ from gripper_stack import GripperStack
 from probe import Probe
 from rclpy.context import Context
 from rclpy.parameter import Parameter
+from servo_probe import ServoProbe
 
+from ccr_ros.nodes.servo_bridge_node import ServoBridgeNode
 from ccr_ros.nodes.solver_node import SolverNode
 from ccr_ros.resources import config_dir
 
@@ -60,6 +62,24 @@ def stack(context: Context, probe: Probe) -> Iterator[Callable[..., GripperStack
 
 
 @pytest.fixture
+def start_bridge(context: Context, probe: Probe, tmp_path: Path) -> Callable[..., ServoBridgeNode]:
+    """Return a function that starts a servo bridge beside the probe; zeros go to a file of ours."""
+
+    def start(namespace: str = "gripper", **values: Any) -> ServoBridgeNode:
+        values = {"calibration_file": str(tmp_path / "zeros.yaml"), **values}
+        overrides = [Parameter(n.replace("__", "."), value=v) for n, v in values.items()]
+        options = {"context": context, "namespace": namespace}
+        return probe.add(ServoBridgeNode(**options, parameter_overrides=overrides))
+
+    return start
+
+
+@pytest.fixture
+def servos(probe: Probe) -> ServoProbe:
+    return ServoProbe(probe)
+
+
+@pytest.fixture
 def small_gripper(tmp_path: Path) -> str:
     """A gripper of two unlike fingers: ``thumb`` with two cables, ``index`` with one."""
     path = tmp_path / "small_gripper.yaml"
@@ -77,3 +97,23 @@ fingers:
         encoding="utf-8",
     )
     return str(path)
+
+
+@pytest.fixture
+def small_rack(small_gripper: str, tmp_path: Path) -> dict[str, str]:
+    """Parameters of a servo bridge for the small gripper: three cables, not in its order."""
+    path = tmp_path / "small_servos.yaml"
+    path.write_text(
+        """
+name: small_rack
+defaults:
+  {spool_radius: 0.008, travel: [-0.003, 0.01], max_rate: 0.02, max_acceleration: 0.1,
+   max_tension: 30.0}
+joints:
+  - {finger: index, cable: main, direction: -1, id: 3}
+  - {finger: thumb, cable: helical, gear: 2.0, id: 2}
+  - {finger: thumb, cable: straight, id: 1}
+""",
+        encoding="utf-8",
+    )
+    return {"gripper_file": small_gripper, "servo_file": str(path)}

@@ -40,7 +40,7 @@ class DynamixelDriver(ServoDriver):
     Args:
         rack: The servos; each joint needs its ``id``. Where it has a ``current_limit`` the servo
             works in current-based position mode within this current, else in extended position
-            mode. Efforts are currents [A].
+            mode. Efforts are known where it has a ``torque_constant``.
         port, baud_rate: Of the bus.
         watchdog: Servos stop and hold when the bus is silent for this long [s]; 0: never.
         current_unit: Current of one count [A].
@@ -65,6 +65,9 @@ class DynamixelDriver(ServoDriver):
         self._joints = dict(zip(ids, rack.joints, strict=True))
         self._watchdog = math.ceil(watchdog / _WATCHDOG_UNIT)
         self._current_unit = current_unit
+        self._torque_constants = np.array(
+            [math.nan if j.torque_constant is None else j.torque_constant for j in rack.joints]
+        )
         self._enabled = False
         self._health_at = -math.inf
         self._errors = ("",) * len(ids)
@@ -101,7 +104,7 @@ class DynamixelDriver(ServoDriver):
         return ServoReading(
             angles=column(bus.PRESENT_POSITION, 1.0 / _COUNTS),
             velocities=column(bus.PRESENT_VELOCITY, _VELOCITY_UNIT),
-            efforts=column(bus.PRESENT_CURRENT, self._current_unit),
+            efforts=column(bus.PRESENT_CURRENT, self._current_unit) * self._torque_constants,
             temperatures=column(bus.PRESENT_TEMPERATURE, 1.0),
             errors=self._errors,
         )

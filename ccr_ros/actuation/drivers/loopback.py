@@ -119,11 +119,10 @@ class LoopbackDriver(ServoDriver):
         pairs = zip(self._transmissions, self.tensions, strict=True)
         torques = np.array([transmission.torque(tension) for transmission, tension in pairs])
         noise = self._random.standard_normal((2, count))
-        units = np.array([joint.torque_per_effort for joint in self.rack.joints])
         return ServoReading(
             angles=self._spools + self.settings.noise * noise[0],
             velocities=self._velocities.copy(),
-            efforts=(torques + self.settings.effort_noise * noise[1]) / units,
+            efforts=torques + self.settings.effort_noise * noise[1],
             temperatures=np.full(count, self.settings.temperature),
             errors=("",) * count,
         )

@@ -26,16 +26,22 @@ class Ros2ControlDriver(ServoDriver):
         rack: The servos; setpoints are sent in their order.
         send: Publishes setpoints [rad].
         timeout: Joint states older than this are a lost bus [s].
+        torque_per_effort: Torque at a servo's shaft [N m] per unit of effort in its joint state.
     """
 
     name = "ros2_control"
 
     def __init__(
-        self, rack: ServoRack, send: Callable[[list[float]], None], timeout: float
+        self,
+        rack: ServoRack,
+        send: Callable[[list[float]], None],
+        timeout: float,
+        torque_per_effort: float = 1.0,
     ) -> None:
         super().__init__(rack)
         self._send = send
         self._timeout = timeout
+        self._torque_per_effort = torque_per_effort
         count = len(rack.joints)
         self._values = np.full((3, count), math.nan)  # angle, velocity, effort
         self._heard = np.full(count, -math.inf)
@@ -89,7 +95,7 @@ class Ros2ControlDriver(ServoDriver):
         return ServoReading(
             angles=self._values[0].copy(),
             velocities=self._values[1].copy(),
-            efforts=self._values[2].copy(),
+            efforts=self._torque_per_effort * self._values[2],
             temperatures=np.full(count, math.nan),
             errors=("",) * count,
         )
