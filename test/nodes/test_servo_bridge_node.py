@@ -196,7 +196,7 @@ def test_calibration(servos, start_bridge, tmp_path):
     set_live(node, loopback__stalled="finger_1_main")
     answer = servos.calibrate()
     assert not answer.success and "finger_1_main: no progress" in answer.message
-    assert servos.state.fault == ServoState.STALL
+    assert servos.in_state(ServoState.FAULT).fault == ServoState.STALL
 
 
 def test_stop_ends_a_calibration(servos, probe, start_bridge):
