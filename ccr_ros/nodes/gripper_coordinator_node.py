@@ -13,6 +13,7 @@ from typing import Any
 from ccr_msgs.msg import CablePulls, FingerGrip, FingerState, GripperState, ServoState
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.clock import Clock, ClockType
+from rclpy.context import Context
 from rclpy.node import Node
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
@@ -23,7 +24,7 @@ from ccr_ros.grasp.machine import State
 from ccr_ros.model import CcrError, Finger
 
 from . import gripper_conversions as convert
-from . import gripper_parameters
+from . import gripper_parameters, runner
 from .conversions import pulls_from_message
 from .diagnostics import make_status
 from .gripper_actions import GripperActions
@@ -205,3 +206,8 @@ class GripperCoordinatorNode(Node):
         )
         header = Header(stamp=self.get_clock().now().to_msg())
         self._diagnostics.publish(DiagnosticArray(header=header, status=[status]))
+
+
+def spin(context: Context | None = None) -> None:
+    """Run the node in a context until this ends; see `runner.spin`."""
+    runner.spin(GripperCoordinatorNode, context)

@@ -1,0 +1,324 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A gripper in a person's words: grasp, hold, release, stop.
+
+    from ccr_ros.gripper import Gripper
+
+    with Gripper() as gripper:
+        gripper.grasp(force=0.2)
+        gripper.release(after=5.0)
+
+Calls wait until what they ask for is done, or raise an error that says why it is not. They talk to
+the coordinator node of a namespace, under ROS 2 as without it. Leaving the ``with`` block lets go
+of nothing.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Any
+
+from ccr_ros.model.errors import CcrError
+from ccr_ros.runtime import enable_ros
+
+_POLL = 0.02  # s
+_REASON_WAIT = 2.0  # s that the reason of a refusal may come after it
+_MARGIN = 10.0  # s beyond the gripper's own timeouts before it counts as silent
+
+
+class GripperError(CcrError):
+    """The gripper did not do what was asked; the text says why."""
+
+
+class NoGripper(GripperError):
+    """No coordinator answers."""
+
+
+class GripperRefused(GripperError):
+    """The gripper does not do this now; nothing has changed."""
+
+
+class GripperFailed(GripperError):
+    """What was begun did not come to its end.
+
+    Attributes:
+        report: What became of it.
+    """
+
+    def __init__(self, report: GripperReport) -> None:
+        self.report = report
+        super().__init__(report.message)
+
+
+@dataclass(frozen=True)
+class GripperReport:
+    """What the gripper says of itself, or what became of a call.
+
+    Attributes:
+        state: One of ``GripperState``'s texts, e.g. ``holding``.
+        message: Why.
+        done: What was asked for is so.
+        forces: Contact force [N] by finger.
+        in_contact: Names of the fingers that touch.
+        object_held: Whether all required fingers press on the object.
+        release_in: Time until a release begins [s]; negative: none waits.
+    """
+
+    state: str
+    message: str
+    done: bool
+    forces: dict[str, float]
+    in_contact: tuple[str, ...]
+    object_held: bool = False
+    release_in: float = -1.0
+
+
+class Gripper:
+    """One gripper, through the coordinator in its namespace.
+
+    Args:
+        namespace: Of the gripper's nodes.
+        timeout: Longest that the coordinator may take to appear or to answer [s].
+
+    Raises:
+        RuntimeMissing: There is neither ROS 2 nor its embedded replacement.
+        NoGripper: No coordinator was found within the timeout.
+    """
+
+    def __init__(self, namespace: str = "/gripper", timeout: float = 10.0) -> None:
+        enable_ros()
+        import rclpy
+        from ccr_msgs.action import Grasp, Release
+        from ccr_msgs.msg import GripperState
+        from rclpy.action import ActionClient
+        from rclpy.context import Context
+        from rclpy.executors import SingleThreadedExecutor
+        from rclpy.node import Node
+        from rclpy.qos import DurabilityPolicy, QoSProfile
+        from std_srvs.srv import Trigger
+
+        self.namespace = namespace
+        self._timeout = timeout
+        self._closed = False
+        self._latest: Any = None
+        self._heard_at = 0.0
+        self._trigger = Trigger.Request
+        self._context = Context()
+        rclpy.init(args=[], context=self._context)
+        self._node = Node("gripper_facade", namespace=namespace, context=self._context)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self._node)
+        self._actions = {
+            kind: ActionClient(self._node, kind, name)
+            for kind, name in ((Grasp, "grasp"), (Release, "release"))
+        }
+        self._grasp_type, self._release_type = Grasp, Release
+        self._services = {
+            name: self._node.create_client(Trigger, name) for name in ("stop", "hold", "reset")
+        }
+        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        self._node.create_subscription(GripperState, "gripper_state", self._hear, latched)
+        self._thread = threading.Thread(target=self._spin, name="gripper", daemon=True)
+        self._thread.start()
+        try:
+            self._find()
+        except BaseException:
+            self.close()
+            raise
+
+    def __enter__(self) -> Gripper:
+        """Return the gripper itself."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Close the connection; what is held stays held."""
+        self.close()
+
+    # What a person does
+
+    def grasp(
+        self,
+        object: str = "",
+        *,
+        force: float = 0.0,
+        width: float = 0.0,
+        speed: float = 0.0,
+        required_fingers: Sequence[str] = (),
+        timeout: float = 30.0,
+    ) -> GripperReport:
+        """Close on an object and hold it; return when all required fingers press.
+
+        Args:
+            object: Its name; empty: whatever is touched.
+            force: Of each finger [N]; 0: the coordinator's default.
+            width: Expected gap between the fingertips [m]; 0: not known.
+            speed: Of the pulls [m/s]; 0: the coordinator's default.
+            required_fingers: Which must touch; empty: all.
+            timeout: Of the grasp [s].
+
+        Raises:
+            GripperRefused: Not now, or not these values.
+            GripperFailed: It was not grasped; the report says what is.
+            NoGripper: The coordinator went silent.
+        """
+        goal = self._grasp_type.Goal(
+            object=object,
+            force=float(force),
+            width=float(width),
+            speed=float(speed),
+            timeout=float(timeout),
+            required_fingers=list(required_fingers),
+        )
+        result = self._achieve(self._grasp_type, goal, timeout + _MARGIN)
+        return self._judge(result, result.reached)
+
+    def hold(self) -> GripperReport:
+        """Hold what is gripped as it is; a release that waits is off.
+
+        Raises:
+            GripperRefused: Nothing is gripped, or there is a fault.
+        """
+        return self._call("hold")
+
+    def release(
+        self, *, after: float = 0.0, fast: bool = False, timeout: float = 30.0
+    ) -> GripperReport:
+        """Let go, now or after a time; return when the fingers are open.
+
+        Args:
+            after: Until the fingers begin to open [s].
+            fast: At the fast speed.
+            timeout: Of the opening [s].
+
+        Raises:
+            GripperRefused, GripperFailed, NoGripper: As for `grasp`. An interrupt, or any other
+                error while it waits, calls the release off.
+        """
+        goal = self._release_type.Goal(delay=float(after), fast=fast)
+        result = self._achieve(self._release_type, goal, after + timeout + _MARGIN)
+        return self._judge(result, result.released)
+
+    def stop(self) -> GripperReport:
+        """Freeze the fingers; what they grip they keep, and a release that waits is off."""
+        return self._call("stop")
+
+    def reset(self) -> GripperReport:
+        """Leave a fault; nothing moves.
+
+        Raises:
+            GripperRefused: What failed is still so.
+        """
+        return self._call("reset")
+
+    @property
+    def state(self) -> GripperReport:
+        """What the gripper says of itself, the newest heard."""
+        return self._report(self._latest, True)
+
+    def close(self) -> None:
+        """Close the connection; what is held stays held. May be called again."""
+        if self._closed:
+            return
+        self._closed = True
+        self._context.try_shutdown()
+        self._thread.join()
+        self._executor.shutdown()
+        self._node.destroy_node()
+
+    # How
+
+    def _spin(self) -> None:
+        from rclpy.executors import ExternalShutdownException
+
+        try:
+            self._executor.spin()
+        except ExternalShutdownException:
+            return
+        except Exception:
+            if self._context.ok():
+                raise
+
+    def _hear(self, message: Any) -> None:
+        self._latest, self._heard_at = message, time.monotonic()
+
+    def _find(self) -> None:
+        ends = [client.server_is_ready for client in self._actions.values()]
+        ends += [client.service_is_ready for client in self._services.values()]
+        self._wait(lambda: self._latest is not None and all(end() for end in ends), self._timeout)
+
+    def _wait(self, condition: Callable[[], Any], timeout: float) -> None:
+        deadline = time.monotonic() + timeout
+        while not condition():
+            self._check_open()
+            if time.monotonic() > deadline:
+                raise NoGripper(
+                    f"no gripper coordinator answers in {self.namespace!r} within {timeout:g} s; "
+                    "is gripper_coordinator_node running there, in the same ROS_DOMAIN_ID?"
+                )
+            time.sleep(_POLL)
+
+    def _check_open(self) -> None:
+        if self._closed or not self._context.ok():
+            raise NoGripper("the connection to the gripper is closed")
+
+    def _achieve(self, kind: Any, goal: Any, timeout: float) -> Any:
+        self._check_open()
+        sent = self._actions[kind].send_goal_async(goal)
+        self._wait(sent.done, self._timeout)
+        handle = sent.result()
+        if not handle.accepted:
+            raise GripperRefused(self._reason())
+        future = handle.get_result_async()
+        try:
+            self._wait(future.done, timeout)
+        except BaseException:
+            if self._context.ok():
+                handle.cancel_goal_async()
+            raise
+        return future.result().result
+
+    def _call(self, name: str) -> GripperReport:
+        self._check_open()
+        future = self._services[name].call_async(self._trigger())
+        self._wait(future.done, self._timeout)
+        answer = future.result()
+        if not answer.success:
+            raise GripperRefused(answer.message)
+        self._newer()
+        return self.state
+
+    def _newer(self) -> None:
+        """Wait for a state that is newer than now."""
+        since = time.monotonic()
+        self._wait(lambda: self._heard_at > since, _REASON_WAIT)
+
+    def _reason(self) -> str:
+        self._newer()
+        return self._latest.refusal or "the gripper refuses, and does not say why"
+
+    def _judge(self, result: Any, done: bool) -> GripperReport:
+        report = self._report(result, done)
+        if not done:
+            raise GripperFailed(report)
+        return report
+
+    def _report(self, message: Any, done: bool) -> GripperReport:
+        fingers = message.fingers
+        touching = tuple(finger.finger for finger in fingers if finger.in_contact)
+        return GripperReport(
+            state=message.state,
+            message=message.message,
+            done=done,
+            forces={finger.finger: finger.force for finger in fingers},
+            in_contact=touching,
+            object_held=getattr(message, "object_held", message.state == "holding"),
+            release_in=getattr(message, "release_in", -1.0),
+        )
