@@ -29,7 +29,7 @@ class Bench:
         """Another client."""
         client = ActionClient(self.client_node, Fibonacci, "count")
         self.ends.append(client)
-        assert client.wait_for_server(15)
+        assert client.wait_for_server(60)
         return client
 
     def close(self):

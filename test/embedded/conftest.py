@@ -55,7 +55,7 @@ def node(make_node):
 def spin(context):
     """Spin nodes until a condition holds; the limit is only there to end a failing test."""
 
-    def run(condition, *nodes, limit=15.0, executor=None):
+    def run(condition, *nodes, limit=60.0, executor=None):
         own = executor or SingleThreadedExecutor(context=context)
         for one in nodes:
             own.add_node(one)
@@ -115,7 +115,7 @@ class Program:
             env={**os.environ, "PYTHONPATH": path, **environment},
         )
 
-    def finish(self, limit=30):
+    def finish(self, limit=60):
         """Exit code, standard output and standard error."""
         try:
             out, err = self.process.communicate(timeout=limit)

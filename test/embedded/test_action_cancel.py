@@ -42,7 +42,7 @@ def cancel(bench):
 
     def send(**goal_info):
         client = bench.client_node.create_client(CancelGoal, "count/_action/cancel_goal")
-        assert client.wait_for_service(15)
+        assert client.wait_for_service(60)
         request = CancelGoal.Request(goal_info=GoalInfo(**goal_info))
         return bench.finish(client.call_async(request))
 

@@ -39,7 +39,7 @@ def spinning(bench, context):
     thread.start()
     yield
     pool.shutdown()
-    thread.join(15)
+    thread.join(60)
 
 
 class HandMade:
@@ -89,7 +89,7 @@ def hand_made(make_node, executor, client):
     node = make_node("hand_made")
     executor.add_node(node)
     chosen = HandMade(node)
-    assert client.wait_for_server(15)
+    assert client.wait_for_server(60)
     return chosen
 
 
@@ -180,7 +180,7 @@ def test_a_handle_may_be_dropped(hand_made, client, finish, spin, executor):
 
 def test_a_destroyed_client(node, spin, hand_made):
     client = ActionClient(node, Fibonacci, "count")
-    assert client.wait_for_server(15)
+    assert client.wait_for_server(60)
     client.destroy()
     with pytest.raises(RCLError):
         client.send_goal_async(Goal())
@@ -218,7 +218,7 @@ def test_calls_that_block(bench, spinning):
     def execute(handle):
         if handle.request.order == 1:
             entered.set()
-            leave.wait(15)
+            leave.wait(60)
             handle.canceled()
         else:
             handle.succeed()
@@ -236,8 +236,8 @@ def test_calls_that_block(bench, spinning):
     )
     arrived, future = threading.Event(), bench.client.send_goal_async(Goal(order=1))
     future.add_done_callback(lambda _: arrived.set())
-    assert arrived.wait(15)
-    assert entered.wait(15)
+    assert arrived.wait(60)
+    assert entered.wait(60)
     goal = future.result()
     assert len(goal.cancel_goal().goals_canceling) == 1
     leave.set()
@@ -247,7 +247,7 @@ def test_calls_that_block(bench, spinning):
 @pytest.mark.processes
 def test_a_server_in_another_process(program, client, finish, spin, executor):
     server = program("counter.py")
-    assert client.wait_for_server(30)
+    assert client.wait_for_server(60)
     got = []
     goal = finish(client.send_goal_async(Goal(order=5), got.append))
     assert spin(lambda: len(got) == 5, executor=executor)
@@ -267,7 +267,7 @@ def test_a_server_in_another_process(program, client, finish, spin, executor):
 @pytest.mark.processes
 def test_a_server_that_is_killed_with_a_goal(program, client, finish, spin, executor):
     server = program("counter.py")
-    assert client.wait_for_server(30)
+    assert client.wait_for_server(60)
     got = []
     goal = finish(client.send_goal_async(Goal(order=0), got.append))
     result = goal.get_result_async()
@@ -276,7 +276,7 @@ def test_a_server_that_is_killed_with_a_goal(program, client, finish, spin, exec
     assert spin(lambda: not client.server_is_ready(), limit=60, executor=executor)
     assert not result.done()
     server = program("counter.py")
-    assert client.wait_for_server(30)
+    assert client.wait_for_server(60)
     goal = finish(client.send_goal_async(Goal(order=2)))
     assert list(finish(goal.get_result_async()).result.sequence) == [1, 2]
     server.process.send_signal(signal.SIGINT)

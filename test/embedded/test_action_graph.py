@@ -143,5 +143,5 @@ def test_names_may_be_remapped(make_node, ends, spin):
     )
     ends(ActionServer, server, "count", print)
     client = ends(ActionClient, make_node("client"), "total")
-    assert client.wait_for_server(15)
+    assert client.wait_for_server(60)
     assert spin(lambda: ("/total", [TYPE]) in get_action_names_and_types(server))

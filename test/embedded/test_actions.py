@@ -19,7 +19,7 @@ Goal, Result, Feedback = Fibonacci.Goal, Fibonacci.Result, Fibonacci.Feedback
 
 
 def wait_for(condition):
-    end = time.monotonic() + 15
+    end = time.monotonic() + 60
     while not condition() and time.monotonic() < end:
         time.sleep(0.01)
     assert condition()
@@ -188,7 +188,7 @@ def test_a_goal_id_is_accepted_once(bench):
     bench.start()
     goal_id = UUID(uuid=list(range(16)))
     raw = bench.client_node.create_client(Fibonacci.Impl.SendGoalService, "count/_action/send_goal")
-    assert raw.wait_for_service(15)
+    assert raw.wait_for_service(60)
     request = Fibonacci.Impl.SendGoalService.Request(goal_id=goal_id)
     answers = [bench.finish(raw.call_async(request)) for _ in range(2)]
     assert [answer.accepted for answer in answers] == [True, False]
@@ -265,7 +265,7 @@ def test_callbacks_in_threads(bench, context):
     both = threading.Barrier(3)
 
     def execute(handle):
-        both.wait(15)
+        both.wait(60)
         handle.succeed()
         return Result(sequence=[handle.request.order])
 
@@ -278,13 +278,13 @@ def test_callbacks_in_threads(bench, context):
     thread.start()
     try:
         goals = [bench.client.send_goal_async(Goal(order=i)) for i in range(2)]
-        both.wait(15)  # both goals are being executed now
+        both.wait(60)  # both goals are being executed now
         wait_for(lambda: all(future.done() for future in goals))
         answers = [future.result().get_result() for future in goals]
         assert [list(answer.result.sequence) for answer in answers] == [[0], [1]]
     finally:
         pool.shutdown()
-        thread.join(15)
+        thread.join(60)
 
 
 def test_a_destroyed_server(bench):

@@ -11,7 +11,7 @@ from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
 def test_unknown_transitions_are_refused(context, spin, number):
     node = LifecycleNode("managed", context=context)
     client = node.create_client(ChangeState, "managed/change_state")
-    assert client.wait_for_service(15)
+    assert client.wait_for_service(60)
     future = client.call_async(ChangeState.Request(transition=Transition(id=number)))
     assert spin(future.done, node)
     assert not future.result().success

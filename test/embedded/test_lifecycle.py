@@ -65,7 +65,7 @@ def ask(managed, make_node, spin):
     def call(kind, name, **fields):
         if name not in clients:
             clients[name] = user.create_client(kind, f"managed/{name}")
-            assert clients[name].wait_for_service(15)
+            assert clients[name].wait_for_service(60)
         future = clients[name].call_async(kind.Request(**fields))
         assert spin(future.done, managed, user)
         return future.result()

@@ -14,7 +14,7 @@ def ask(make_node, spin):
 
     def call(kind, name, **fields):
         client = user.create_client(kind, f"talker/{name}")
-        assert client.wait_for_service(15)
+        assert client.wait_for_service(60)
         future = client.call_async(kind.Request(**fields))
         assert spin(future.done, node, user)
         return future.result()

@@ -43,7 +43,7 @@ def user(make_node):
 @pytest.fixture
 def client(holder, user):
     client = AsyncParameterClient(user, "holder")
-    assert client.wait_for_services(15)
+    assert client.wait_for_services(60)
     assert client.services_are_ready()
     return client
 

@@ -46,7 +46,7 @@ def ask(holder, make_node, spin):
         kind = SERVICES[name]
         if name not in clients:
             clients[name] = user.create_client(kind, f"/ns/holder/{name}")
-            assert clients[name].wait_for_service(15)
+            assert clients[name].wait_for_service(60)
         future = clients[name].call_async(kind.Request(**fields))
         assert spin(future.done, holder, user)
         return future.result()
@@ -185,13 +185,13 @@ def test_or_all_at_once(holder, ask):
 def test_undeclared_parameters_where_they_are_allowed(make_node, spin):
     node = make_node("loose", allow_undeclared_parameters=True)
     client = node.create_client(srv.SetParameters, "loose/set_parameters")
-    assert client.wait_for_service(15)
+    assert client.wait_for_service(60)
     future = client.call_async(srv.SetParameters.Request(parameters=wanted(new=[True, False])))
     assert spin(future.done, node)
     assert future.result().results[0].successful
     assert list(node.get_parameter("new").value) == [True, False]
     getter = node.create_client(srv.GetParameters, "loose/get_parameters")
-    assert getter.wait_for_service(15)
+    assert getter.wait_for_service(60)
     future = getter.call_async(srv.GetParameters.Request(names=["new", "other"]))
     assert spin(future.done, node)
     assert future.result().values[1] == ParameterValue()

@@ -111,7 +111,7 @@ def test_a_process_that_stood_still_comes_back(node, spin, program):
     talker = program("talker.py")
     assert spin(lambda: got, node)
     talker.process.send_signal(signal.SIGSTOP)
-    assert spin(lambda: "talker" not in node.get_node_names(), node, limit=30)
+    assert spin(lambda: "talker" not in node.get_node_names(), node)
     seen = len(got)
     talker.process.send_signal(signal.SIGCONT)
     assert spin(lambda: "talker" in node.get_node_names() and len(got) > seen, node)

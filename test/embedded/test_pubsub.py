@@ -201,7 +201,7 @@ def test_manual_liveliness_and_acknowledgement(node, spin):
 def test_wait_for_message(node):
     publisher = node.create_publisher(String, "map", LATCHED)
     publisher.publish(String(data="here"))
-    found, message = wait_for_message(String, node, "map", qos_profile=LATCHED, time_to_wait=15)
+    found, message = wait_for_message(String, node, "map", qos_profile=LATCHED, time_to_wait=60)
     assert (found, message) == (True, String(data="here"))
     assert wait_for_message(String, node, "never", time_to_wait=0.05) == (False, None)
 

@@ -25,7 +25,7 @@ def pair(make_node):
     server, user = make_node("server"), make_node("user")
     server.create_service(SetBool, "flip", flip)
     client = user.create_client(SetBool, "flip")
-    assert client.wait_for_service(15)
+    assert client.wait_for_service(60)
     return server, user, client
 
 
@@ -48,7 +48,7 @@ def test_clients_do_not_get_each_others_responses(pair, make_node, spin):
     server, user, client = pair
     other_node = make_node("other")
     other = other_node.create_client(SetBool, "flip")
-    assert other.wait_for_service(15)
+    assert other.wait_for_service(60)
     mine = client.call_async(SetBool.Request(data=True))
     theirs = other.call_async(SetBool.Request(data=False))
     assert spin(lambda: mine.done() and theirs.done(), server, user, other_node)
@@ -63,10 +63,10 @@ def test_a_blocking_call_while_another_thread_spins(pair, context):
     thread = threading.Thread(target=executor.spin, daemon=True)
     thread.start()
     try:
-        assert client.call(SetBool.Request(data=False), timeout_sec=15).success
+        assert client.call(SetBool.Request(data=False), timeout_sec=60).success
     finally:
         executor.shutdown()
-        thread.join(15)
+        thread.join(60)
 
 
 def test_a_service_may_call_another_in_its_callback(make_node, spin, context):
@@ -82,8 +82,8 @@ def test_a_service_may_call_another_in_its_callback(make_node, spin, context):
 
     node.create_service(Trigger, "outer", outer, callback_group=group)
     client = node.create_client(Trigger, "outer")
-    assert client.wait_for_service(15)
-    assert inner.wait_for_service(15)
+    assert client.wait_for_service(60)
+    assert inner.wait_for_service(60)
     future = client.call_async(Trigger.Request())
     assert spin(future.done, node)
     assert future.result() == Trigger.Response(success=True, message="by way of flip")
@@ -116,7 +116,7 @@ def test_a_callback_that_returns_something_else_raises(make_node, spin):
     node = make_node("server")
     node.create_service(SetBool, "flip", lambda request, response: None)
     client = node.create_client(SetBool, "flip")
-    assert client.wait_for_service(15)
+    assert client.wait_for_service(60)
     future = client.call_async(SetBool.Request())
     with pytest.raises(TypeError):
         spin(future.done, node)
@@ -178,7 +178,7 @@ def test_services_across_processes(program, node, spin):
     server = program("flipper.py")
     server.wait_for_line("ready")
     client = node.create_client(SetBool, "/flip")
-    assert client.wait_for_service(15)
+    assert client.wait_for_service(60)
     futures = [client.call_async(SetBool.Request(data=data)) for data in (True, False)]
     assert spin(lambda: all(future.done() for future in futures), node)
     assert [future.result().success for future in futures] == [False, True]

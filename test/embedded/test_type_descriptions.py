@@ -29,7 +29,7 @@ def describe(user, make_node, spin):
     """Ask the node for an interface, by hash."""
     asker = make_node("asker")
     client = asker.create_client(GetTypeDescription, "user/get_type_description")
-    assert client.wait_for_service(15)
+    assert client.wait_for_service(60)
 
     def call(type_hash, sources=True):
         request = GetTypeDescription.Request(

@@ -20,7 +20,7 @@ from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
-TIMEOUT = 15.0  # s; never reached when all is well
+TIMEOUT = 60.0  # s; never reached when all is well
 
 
 class Probe:

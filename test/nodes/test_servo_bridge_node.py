@@ -203,7 +203,7 @@ def test_stop_ends_a_calibration(servos, probe, start_bridge):
     start_bridge(**SPRING, calibration__rate=0.001)
     servos.in_state(ServoState.ACTIVE)
     client = probe.node.create_client(Calibrate, "servo_bridge_node/calibrate")
-    assert client.wait_for_service(15.0)
+    assert client.wait_for_service(60)
     future = client.call_async(Calibrate.Request())
     servos.in_state(ServoState.CALIBRATING)
     assert servos.trigger("stop").success

@@ -170,7 +170,7 @@ def test_others_set_parameters_through_the_service(probe, start, small_gripper):
     node = start(gripper_file=small_gripper, markers=False)
     arrays = probe.markers()
     client = probe.node.create_client(SetParameters, f"{node.get_name()}/set_parameters")
-    assert client.wait_for_service(15.0)
+    assert client.wait_for_service(60)
 
     def set_from_outside(**values):
         wanted = [Parameter(name, value=v).to_parameter_msg() for name, v in values.items()]

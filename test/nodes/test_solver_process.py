@@ -13,7 +13,7 @@ from visualization_msgs.msg import MarkerArray
 
 ROOT = Path(__file__).resolve().parents[2]
 RUN = "import sys; from ccr_ros.nodes.entry import solver_node; sys.exit(solver_node())"
-WAIT = 30.0  # s; never reached when all is well
+WAIT = 90.0  # s; never reached when all is well
 
 
 def command(*ros_args, script=RUN):

@@ -117,6 +117,6 @@ def test_an_interrupt_cancels_the_goal(start_ccr, server, number, code):
     while "Goal accepted" not in process.stdout.readline():
         assert process.poll() is None
     process.send_signal(number)
-    out, err = process.communicate(timeout=30)
+    out, err = process.communicate(timeout=60)
     assert out.endswith("Canceling goal...\nGoal canceled.\n")
     assert (process.returncode, err) == (code, "")

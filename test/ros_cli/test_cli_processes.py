@@ -40,7 +40,7 @@ def test_signals_end_endless_commands_quietly(start_ccr, talking, words, line, n
     process = start_ccr("topic", *words)
     assert process.stdout.readline().startswith(line)  # reaches a pipe while the command runs
     process.send_signal(number)
-    _, err = process.communicate(timeout=30)
+    _, err = process.communicate(timeout=60)
     assert (process.returncode, complaints(err)) == (code, [])
 
 
@@ -50,7 +50,7 @@ def test_a_signal_ends_a_call_that_gets_no_answer(start_ccr, peer):
     process = start_ccr("service", "call", "/slow", "std_srvs/srv/SetBool")
     assert process.stdout.readline().startswith("requester: making request: ")
     process.send_signal(signal.SIGTERM)
-    out, err = process.communicate(timeout=30)
+    out, err = process.communicate(timeout=60)
     released.set()
     assert (process.returncode, out.strip(), err) == (143, "", "")
 
@@ -71,7 +71,7 @@ def test_a_reader_that_goes_ends_echo_quietly(start_ccr, talking):
     process = start_ccr("topic", "echo", "/chatter")
     process.stdout.readline()
     process.stdout.close()
-    assert process.wait(timeout=30) == 0
+    assert process.wait(timeout=60) == 0
     assert complaints(process.stderr.read()) == []
 
 

@@ -32,7 +32,7 @@ def gone(pid):
 
 
 def wait_for_output(child, text):
-    deadline = time.monotonic() + 20
+    deadline = time.monotonic() + 60
     while text not in child.output and time.monotonic() < deadline:
         time.sleep(0.02)
     assert text in child.output
@@ -59,7 +59,7 @@ def test_an_ended_child_tells_how_and_what_it_said(module, tmp_path):
     with Children(tmp_path, env) as children:
         program = write("print('early'); print(); raise SystemExit('too bad')")
         child = children.start(Part("talker", (program,), ""))
-        child.wait(time.monotonic() + 20)
+        child.wait(time.monotonic() + 60)
         error = child.ended()
     assert isinstance(error, StackFailed)
     assert "talker (process" in str(error) and "exit code 1" in str(error)
@@ -73,7 +73,7 @@ def test_a_killed_child_tells_by_which_signal(module, tmp_path):
     with Children(tmp_path, env) as children:
         child = children.start(Part("sleeper", (write("import time; time.sleep(60)"),), ""))
         os.kill(child.pid, signal.SIGKILL)
-        child.wait(time.monotonic() + 20)
+        child.wait(time.monotonic() + 60)
         assert "killed by SIGKILL" in str(child.ended())
         assert "(nothing)" in str(child.ended())
 
@@ -98,7 +98,7 @@ def test_children_end_if_their_parent_is_killed(module, tmp_path):
     process.kill()
     process.wait()
     process.stdout.close()
-    deadline = time.monotonic() + 20
+    deadline = time.monotonic() + 60
     while not (gone(pid) or zombie(pid)) and time.monotonic() < deadline:
         time.sleep(0.05)
     assert gone(pid) or zombie(pid)

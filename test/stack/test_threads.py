@@ -47,7 +47,7 @@ def part(tmp_path, monkeypatch):
 
 
 def finished(node):
-    node.wait(time.monotonic() + 20)
+    node.wait(time.monotonic() + 60)
     assert node.exit_code is not None
     return node.exit_code
 
