@@ -60,7 +60,7 @@ setup(
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
         (SHARE, ["package.xml"]),
-        *tree("config", "*.yaml"),
+        *tree("config", "*.yaml", "*.csv"),
         *tree("msg_defs", "package.xml", "*.msg", "*.srv", "*.action"),
         *tree("launch", "*.launch.py", "*.launch.xml", "*.launch.yaml"),
         *tree("rviz", "*.rviz"),

@@ -72,22 +72,49 @@ def response(problem: EquilibriumProblem, point: KktPoint, taut: np.ndarray) -> 
     pulled = np.diag(taut * problem.finger.length)
     bound = np.column_stack([problem.length_bounds(unit) - zero for unit in pulled])
     active = np.flatnonzero(point.active)
-    rows, k = point.rows[active], len(active)
     lengths = active < groups
-    system = np.zeros((n + k, n + k))
-    system[:n, :n], system[:n, n:], system[n:, :n] = point.hessian, rows.T, rows
-    right = np.zeros((n + k, count))
+    right = np.zeros((n + len(active), count))
     right[n:][lengths] = bound[active[lengths]]
     slack = np.flatnonzero(~taut) if groups == count else np.zeros(0, dtype=int)
     right[:n, slack] = -point.rows[slack].T
-    try:
-        solved = np.linalg.solve(system, right)
-    except np.linalg.LinAlgError:  # twin constraints: the least-norm multipliers
-        solved = np.linalg.lstsq(system, right, rcond=None)[0]
+    solved = _solved(point, active, right)
     tensions = np.zeros((groups, count))
     tensions[active[lengths]] = solved[n:][lengths]
     tensions[slack, slack] += 1.0
     return Response(solved[:n], tensions, solved[n:][~lengths], active[~lengths] - groups)
+
+
+def torsion_response(problem: EquilibriumProblem, point: KktPoint) -> tuple[np.ndarray, np.ndarray]:
+    """Return how a converged pose answers to Poisson's ratio, pulls held, active set held.
+
+    The twist coordinates' part of the energy 1/2 y.y goes with GJ = EI / (1 + nu), so that
+    H dy + A' dm = y / (1 + nu) dnu in these coordinates.
+
+    Returns:
+        (n+1, 3) of the disk centres [m], and (m,) of the tensions [N, or per EI], per unit of nu.
+    """
+    finger, n = problem.finger, problem.size
+    active = np.flatnonzero(point.active)
+    right = np.zeros((n + len(active), 1))
+    right[2:n:3, 0] = point.at.y[2::3] * finger.torsion_ratio
+    solved = _solved(point, active, right)[:, 0]
+    disks = (point.first.points[problem.points.backbone] @ solved[:n]) * finger.length
+    tensions = np.zeros(len(point.tensions))
+    lengths = active < len(tensions)
+    tensions[active[lengths]] = solved[n:][lengths]
+    unit = finger.bending_stiffness / finger.length**2
+    return disks, tensions[problem.base_group] * unit
+
+
+def _solved(point: KktPoint, active: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Solve the KKT system of the active constraints for right-hand sides (N + k, .)."""
+    rows, n, k = point.rows[active], len(point.hessian), len(active)
+    system = np.zeros((n + k, n + k))
+    system[:n, :n], system[:n, n:], system[n:, :n] = point.hessian, rows.T, rows
+    try:
+        return np.linalg.solve(system, right)
+    except np.linalg.LinAlgError:  # twin constraints: the least-norm multipliers
+        return np.linalg.lstsq(system, right, rcond=None)[0]
 
 
 def turns(problem: EquilibriumProblem, point: KktPoint, dy: np.ndarray) -> np.ndarray:

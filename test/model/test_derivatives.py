@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -15,6 +16,7 @@ from ccr_ros.model import Box, Cylinder, FingerSolver, SolverSettings, Sphere, l
 from ccr_ros.model.equilibrium import EquilibriumProblem
 from ccr_ros.model.rod import Rod, centerline
 from ccr_ros.model.rotation import cross, quaternion_from_matrix, skew
+from ccr_ros.model.sensitivity import torsion_response
 from ccr_ros.resources import find_config
 
 from .fingers import helical_cable, make_finger, straight_cable
@@ -171,6 +173,23 @@ def test_sensitivities(name: str, pulls: list[float], model: str) -> None:
         assert found.contacts[:, j] == pytest.approx(slope, rel=1e-4, abs=1e-3)
     assert len(found.contacts) == len(middle.contacts)
     assert bool(middle.contacts) == (name == "contact_cylinder")
+
+
+@pytest.mark.parametrize(("name", "pulls"), [("helical", [0.006]), ("two_cables", [0.004, 0.005])])
+def test_response_to_poissons_ratio(name: str, pulls: list[float]) -> None:
+    finger = load_finger(find_config(name))
+    settings = SolverSettings(tolerance=1e-12)
+    solver = FingerSolver(finger, settings)
+    solver.solve(pulls)
+    disks, tensions = torsion_response(solver.problem, solver.point)
+    step = 1e-5
+    high, low = (
+        FingerSolver(replace(finger, poisson_ratio=finger.poisson_ratio + h), settings).solve(pulls)
+        for h in (step, -step)
+    )
+    assert disks == pytest.approx((high.backbone - low.backbone) / (2 * step), abs=1e-8)
+    assert np.abs(disks).max() > 1e-4
+    assert tensions == pytest.approx((high.tensions - low.tensions) / (2 * step), rel=1e-5)
 
 
 def test_sensitivity_of_a_slack_cable_is_nothing() -> None:

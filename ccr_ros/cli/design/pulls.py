@@ -83,7 +83,7 @@ def run(args: argparse.Namespace) -> int:
     planner = PullPlanner(
         FingerSolver(finger),
         _limits(args, finger),
-        slack=None if args.slack is None else _number("--slack", args.slack),
+        slack=None if args.slack is None else parse_number("--slack", args.slack),
     )
     targets = _path(args) if args.path else [_target(args, finger)]
     found = [planner.reach(targets[0])]
@@ -105,7 +105,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _target(args: argparse.Namespace, finger: Finger) -> Target:
-    weight = None if args.turn_weight is None else _number("--turn-weight", args.turn_weight)
+    weight = None if args.turn_weight is None else parse_number("--turn-weight", args.turn_weight)
     if args.tip is not None:
         return _tip("--tip", _numbers("--tip", args.tip), args.unit, weight)
     if args.points is not None:
@@ -126,7 +126,7 @@ def _target(args: argparse.Namespace, finger: Finger) -> Target:
         raise InvalidValue("--obstacle", None, f"given: one of {', '.join(names) or 'none'}")
     if args.obstacle is not None and args.obstacle not in names:
         raise UnknownName("obstacle", args.obstacle, names)
-    return PressTarget(int(disk), args.obstacle or names[0], _number("--press", force))
+    return PressTarget(int(disk), args.obstacle or names[0], parse_number("--press", force))
 
 
 def _path(args: argparse.Namespace) -> list[Target]:
@@ -134,7 +134,7 @@ def _path(args: argparse.Namespace) -> list[Target]:
     if table.values.shape[1] not in (3, 7):
         wanted = "3 or 7 values a line are wanted: x, y, z, or with a quaternion"
         raise InvalidFile(args.path, f"{wanted} (got {table.values.shape[1]})")
-    weight = None if args.turn_weight is None else _number("--turn-weight", args.turn_weight)
+    weight = None if args.turn_weight is None else parse_number("--turn-weight", args.turn_weight)
     targets: list[Target] = []
     for row, line in zip(table.values, table.lines, strict=True):
         try:
@@ -162,7 +162,7 @@ def _limits(args: argparse.Namespace, finger: Finger) -> PullLimits:
             raise InvalidValue("--max-tension", word, "CABLE=VALUE, such as main=12")
         if cable in tension:
             raise InvalidValue(f"--max-tension {cable}", word, "given once per cable")
-        tension[cable] = _number(f"--max-tension {cable}", text)
+        tension[cable] = parse_number(f"--max-tension {cable}", text)
     low = parse_pulls(args.min_pull, names, lengths, "--min-pull")
     high = parse_pulls(args.max_pull, names, lengths, "--max-pull")
     return PullLimits.of(finger, tension, low, high)
@@ -188,10 +188,15 @@ def _plot(
 
 
 def _numbers(option: str, text: str) -> list[float]:
-    return [_number(option, word) for word in text.split(",")]
+    return [parse_number(option, word) for word in text.split(",")]
 
 
-def _number(option: str, text: str) -> float:
+def parse_number(option: str, text: str) -> float:
+    """Return a finite number from the text of an option.
+
+    Raises:
+        InvalidValue: It is none.
+    """
     try:
         value = float(text)
     except ValueError:
