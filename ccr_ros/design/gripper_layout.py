@@ -17,7 +17,7 @@ from ..model.rotation import Pose
 from .contours import Section
 from .curve_text import SizedObject
 
-_MOST_FINGERS = 12
+MOST_FINGERS = 12
 _FACING = 1e-6  # rad
 
 
@@ -48,7 +48,7 @@ class GripperLayout:
     def __post_init__(self) -> None:
         checks.real("base_radius", self.base_radius, above=0, high=1e3, unit="m")
         height = checks.real("center_height", self.center_height, low=-1e3, high=1e3, unit="m")
-        most = 4 if self.body.kind == "box" else _MOST_FINGERS
+        most = 4 if self.body.kind == "box" else MOST_FINGERS
         checks.integer("fingers", self.fingers, low=2, high=most)
         below = self.body.extent[2] / 2 - height
         if below > 0:

@@ -53,7 +53,7 @@ def test_box_pictures_parts_and_json(tmp_path, capsys):
     found = json.loads(capsys.readouterr().out)
     assert found["gripper"] == "crate" and found["reached"]
     assert found["files"] == [
-        str(tmp_path / n) for n in ("crate.yaml", "box_finger_1.yaml", "box_finger_2.yaml")
+        str(tmp_path / n) for n in ("crate.yaml", "crate_finger_1.yaml", "crate_finger_2.yaml")
     ]
     one, two, three, four = found["fingers"]
     assert one["pose"]["backbone"] == three["pose"]["backbone"] != two["pose"]["backbone"]
@@ -62,7 +62,7 @@ def test_box_pictures_parts_and_json(tmp_path, capsys):
     files = {m.finger.name: m.finger for m in load_gripper(tmp_path / "crate.yaml").fingers}
     a, b, c = (files[f"finger_{k}"].rest_curvature for k in (1, 2, 3))
     assert np.array_equal(a, c) and not np.array_equal(a, b)
-    for name in ("box_finger_1", "box_finger_2"):
+    for name in ("crate_finger_1", "crate_finger_2"):
         assert trimesh.load(tmp_path / "parts" / f"{name}.stl").is_watertight
         assert (tmp_path / "parts" / f"{name}_holes.csv").is_file()
     assert (tmp_path / "p.png").stat().st_size > 20_000
@@ -86,18 +86,21 @@ def test_no_rest_shape_ends_with_1_and_writes_nothing(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--object", "cone:1", "--pull", "3%"], "unknown object 'cone:1'; valid: sphere:DIAMETER"),
-        (["--pull", "3%", "--fingers", "x"], "--fingers: 'x' is not allowed; must be an integer"),
-        (["--pull", "3%", "--fingers", "1"], "fingers: 1 is not allowed"),
+        (["--object", "cone:1", "--pull", "3%"], "unknown object 'cone:1'; valid: sphere"),
+        (
+            ["--pull", "3%", "--fingers", "x"],
+            "--fingers: 'x' is not allowed; must be an integer 2..12",
+        ),
+        (["--pull", "3%", "--fingers", "1"], "--fingers: '1' is not allowed"),
         (["--pull", "3%", "--base-radius", "4cm"], "--base-radius: '4cm'"),
-        (["--pull", "3%", "--base-radius", "nan"], "base_radius: nan"),
+        (["--pull", "3%", "--base-radius", "nan"], "--base-radius: 'nan'"),
         (["--pull", "three"], "--pull main: 'three'"),
         (["--pull=-5%"], "pulls: {'main': -0.05} is not allowed"),
         (["--pull", "thumb=3%"], "unknown cable 'thumb'"),
         (["--pull", "3%", "--pull", "main=2%"], "given once per cable"),
         (["--pull", "3%", "--finger", "two_cables"], "'two_cables' has several cables"),
         (["--pull", "3%", "--finger", "gripper_sphere"], "describes a gripper"),
-        (["--pull", "3%", "--length", "0"], "length: 0.0"),
+        (["--pull", "3%", "--length", "0"], "--length: '0'"),
         (["--pull", "3%", "--center-height", "0.05"], "6 mm below the base plane"),
         (["--pull", "3%", "--name", "my gripper"], "name: 'my gripper'"),
         (["--pull", "3%", "--plot", "p.txt"], "plot file: 'p.txt'"),

@@ -39,7 +39,7 @@ def test_it_writes_tables_and_a_solid(tmp_path, capsys):
         (["no_such"], "unknown config file 'no_such'"),
         (["straight", "--hole-diameter", "1mm"], "--hole-diameter: '1mm' is not allowed"),
         (["straight", "--hole-diameter", "0.05"], "hole_diameter: 0.05 is not allowed"),
-        (["straight", "--base-plate", "nan"], "plate_diameter: nan"),
+        (["straight", "--base-plate", "nan"], "--base-plate: 'nan'"),
         (["straight", "--out", "{file}/x"], "cannot be made a folder"),
     ],
 )

@@ -26,11 +26,12 @@ from typing import Any
 
 import numpy as np
 
+from ccr_ros.cli.options import integer, number
 from ccr_ros.cli.solve import parse_pull
 from ccr_ros.design.curve_text import object_from_text
 from ccr_ros.design.gripper import GripperDesign, GripperTask, NoRestShape, design_gripper
 from ccr_ros.design.gripper_files import write_gripper
-from ccr_ros.design.gripper_layout import GripperLayout
+from ccr_ros.design.gripper_layout import MOST_FINGERS, GripperLayout
 from ccr_ros.design.gripper_report import kinds_of, report, summary, to_dict
 from ccr_ros.design.pull import Pull
 from ccr_ros.model import Finger, FingerSolver, InvalidValue, UnknownName
@@ -89,7 +90,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="where the fingers come to the contour, along it from the object's middle upwards"
         " (default: where they bend least on the way) [m]",
     )
-    parser.add_argument("--name", metavar="NAME", help="of the gripper (default gripper_OBJECT)")
+    parser.add_argument(
+        "--name",
+        metavar="NAME",
+        help="of the gripper; its fingers are NAME_finger (default gripper_OBJECT, OBJECT_finger)",
+    )
     parser.add_argument("--out", metavar="DIR", default=".", help="folder to write into (made)")
     parser.add_argument("--plot", metavar="FILE.png", help="draw the first finger's design")
     parser.add_argument("--strip", metavar="FILE.png", help="draw the gripper as it closes")
@@ -121,7 +126,7 @@ def run(args: argparse.Namespace) -> int:
         design.gripper,
         kinds,
         output_folder(args.out),
-        f"{kind}_finger",
+        f"{args.name or kind}_finger",
         comment=f"Made by: {command}",
         finger_comments=[
             f"{summary(design.fingers[kinds.index(k)])}\nMade by: {command}"
@@ -148,20 +153,22 @@ def run(args: argparse.Namespace) -> int:
 def _task(args: argparse.Namespace) -> GripperTask:
     template = load_finger(find_config(args.finger))
     if args.length is not None:
-        template = replace(template, length=_number("--length", args.length), rest_curvature=None)
+        template = replace(
+            template, length=number("--length", args.length, 1e-3, 1e3), rest_curvature=None
+        )
     layout = GripperLayout(
         object_from_text(args.object),
-        _number("--center-height", args.center_height),
-        _number("--base-radius", args.base_radius),
-        _whole("--fingers", args.fingers),
+        number("--center-height", args.center_height, -1e3, 1e3),
+        number("--base-radius", args.base_radius, 1e-3, 1e3),
+        integer("--fingers", args.fingers, 2, MOST_FINGERS),
     )
     return GripperTask(
         layout,
         template,
         _pulls(args.pull, template),
-        clearance=_number("--clearance", args.clearance),
-        press=_number("--press", args.press),
-        join=None if args.join is None else _number("--join", args.join),
+        clearance=number("--clearance", args.clearance, 0, 1),
+        press=number("--press", args.press, 0, 1e9),
+        join=None if args.join is None else number("--join", args.join, -1e3, 1e3),
     )
 
 
@@ -178,20 +185,6 @@ def _pulls(words: list[str], finger: Finger) -> dict[str, Pull]:
             raise InvalidValue(f"--pull {cable}", word, "given once per cable")
         pulls[cable] = Pull(*parse_pull(f"--pull {cable}", text))
     return pulls
-
-
-def _number(option: str, text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        raise InvalidValue(option, text, "a number") from None
-
-
-def _whole(option: str, text: str) -> int:
-    try:
-        return int(text)
-    except ValueError:
-        raise InvalidValue(option, text, "an integer") from None
 
 
 def _command(args: argparse.Namespace) -> str:

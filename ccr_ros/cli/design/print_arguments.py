@@ -7,10 +7,11 @@ import argparse
 import re
 from pathlib import Path
 
+from ccr_ros.cli.options import number
 from ccr_ros.design.part_tables import write_tables
 from ccr_ros.design.parts import PrintOptions, finger_parts
 from ccr_ros.design.solid import finger_solid, write_stl
-from ccr_ros.model import Finger, InvalidFile, InvalidValue
+from ccr_ros.model import Finger, InvalidFile
 
 _DEFAULTS = PrintOptions()
 _LENGTHS = {
@@ -45,10 +46,7 @@ def options_from_args(args: argparse.Namespace) -> PrintOptions:
     for option, (key, _) in _LENGTHS.items():
         text = getattr(args, key)
         if text is not None:
-            try:
-                given[key] = float(text)
-            except ValueError:
-                raise InvalidValue(option, text, "a number of metres") from None
+            given[key] = number(option, text, 0, 1)
     return PrintOptions(**given, routed_only=args.routed_holes)
 
 
