@@ -50,7 +50,7 @@ def fit_pose(problem: EquilibriumProblem, shape: DesiredShape) -> PoseFit:
     n, segment = shape.segments, 1.0 / shape.segments
     length = problem.finger.length
     points = shape.points / length
-    tangents = _tangents(points) if shape.tangents is None else shape.tangents
+    tangents = _wanted_tangents(shape, length)
     free = np.ones((2 * PIECES, 3), dtype=bool)
     free[:, 2] = shape.frames is not None
     columns = np.flatnonzero(free.ravel())
@@ -81,6 +81,16 @@ def fit_pose(problem: EquilibriumProblem, shape: DesiredShape) -> PoseFit:
         float(np.sum(off * off)),
         float(np.linalg.norm(cross(axes, tangents), axis=1).max()),
     )
+
+
+def smooth_guess(problem: EquilibriumProblem, shape: DesiredShape) -> np.ndarray:
+    """Return coordinates (N,) of a pose that turns as wanted from disk to disk, free of twist."""
+    frames = _untwisted(_wanted_tangents(shape, problem.finger.length))
+    return (_guess(frames) / problem.coordinate_scale).ravel()
+
+
+def _wanted_tangents(shape: DesiredShape, length: float) -> np.ndarray:
+    return _tangents(shape.points / length) if shape.tangents is None else shape.tangents
 
 
 def _gaps(

@@ -12,6 +12,7 @@ import numpy as np
 from ccr_ros import __version__
 from ccr_ros.model.finger import Finger
 
+from .best_fit import BestFit
 from .rest_shape import RestShape
 from .target import DesiredShape
 from .verify import PullPath
@@ -19,16 +20,18 @@ from .verify import PullPath
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """A rest shape, and where pulling it from rest leads."""
+    """A rest shape, where pulling it from rest leads, and how it was found if by a best fit."""
 
     shape: RestShape
     path: PullPath
+    fit: BestFit | None = None
 
     @property
     def rank(self) -> tuple[bool, bool, bool, float]:
-        """What a better one has less of: misses, jumps, instability, tension."""
-        worst = float(self.shape.tensions.max(initial=0.0))
-        return not self.path.reached, bool(self.path.jumps), not self.shape.stable, worst
+        """What a better one has less of: misses, jumps, instability; error if missed; tension."""
+        path, tension = self.path, float(self.shape.tensions.max(initial=0.0))
+        last = tension if path.reached else path.squared_error
+        return not path.reached, bool(path.jumps), not self.shape.stable, last
 
     @property
     def verdict(self) -> str:
@@ -37,6 +40,9 @@ class Found:
         if not path.completed:
             return f"NOT REACHED: {path.message}"
         error = f"sum of squared disk errors {path.squared_error * 1e6:.2g} mm2"
+        if not path.reached:
+            rms = np.sqrt(path.squared_error / (len(path.last.backbone) - 1))
+            error += f", RMS {rms * 1e3:.3g} mm"
         words = "reached" if path.reached else "NOT REACHED"
         notes = [f"{words} from rest in {path.wanted} steps of the pulls, {error}"]
         if path.jumps:
@@ -102,11 +108,22 @@ def print_table(
             )
         if shape.rest_gap < 0:
             print(f"    the rest shape stands {-shape.rest_gap * 1e3:.3g} mm inside an obstacle")
+        if item.fit is not None:
+            print(f"    {_fit_line(item.fit)}")
         print(f"    {item.verdict}\n")
     for line in refused:
         print(f"  no rest shape: {line}")
     if best is not None:
         _print_disks(wanted, best)
+
+
+def _fit_line(fit: BestFit) -> str:
+    end = "a least error" if fit.optimal else "ended before it was the least"
+    line = (
+        f"best fit: from {fit.first_error * 1e6:.2g} mm2 to {fit.shape.squared_error * 1e6:.2g}"
+        f" mm2 in {fit.solves} forward solves, {end}"
+    )
+    return line + (f"; {fit.at_bound} ends of pieces bend as far as allowed" * bool(fit.at_bound))
 
 
 def _print_disks(wanted: DesiredShape, best: Found) -> None:
@@ -157,9 +174,18 @@ def _entry(item: Found) -> dict[str, Any]:
         "rest": shape.rest.tolist(),
         "backbone": path.last.backbone.tolist(),
         "contacts": path.last.to_dict()["contacts"],
+        "fit": None
+        if item.fit is None
+        else {
+            "first_error": item.fit.first_error,
+            "solves": item.fit.solves,
+            "optimal": item.fit.optimal,
+            "at_bound": item.fit.at_bound,
+        },
         "forward": {
             "reached": path.reached,
             "squared_error": path.squared_error,
+            "tolerance": path.tolerance,
             "steps": path.wanted,
             "jumps": list(path.jumps),
             "unstable": list(path.unstable),

@@ -18,12 +18,12 @@ from ccr_ros.model.errors import InvalidValue, UnknownName
 from ccr_ros.model.finger import Finger
 from ccr_ros.model.result import softest_direction
 from ccr_ros.model.settings import SolverSettings
-from ccr_ros.model.sqp import derive
+from ccr_ros.model.sqp import KktPoint, derive
 
 from .pose_fit import PIECES, PoseFit, fit_pose
 from .press import INSIDE, Press, deepest, pushes
 from .pull import Pull
-from .rest_statics import Push, RestStatics
+from .rest_statics import Push, RestStatics, curvature_ends
 from .target import DesiredShape
 from .tension_roots import taut_sets, tension_roots
 
@@ -121,10 +121,11 @@ class RestShapeSolver:
         """
         finger, problem = self.finger, self.problem
         shape.check_fits(finger)
-        given = _checked_pulls(finger, pulls)
-        bending, twist = finger.largest_rest_curvature
+        given = checked_pulls(finger, pulls)
+        largest = finger.largest_rest_curvature
+        limit = largest[0]
         if max_curvature is not None:
-            bending = checks.real("max_curvature", max_curvature, above=0, high=bending, unit="1/m")
+            limit = checks.real("max_curvature", max_curvature, above=0, high=limit, unit="1/m")
         fit = fit_pose(problem, shape)
         at = problem.evaluate(fit.y)
         depth, disk, name = deepest(problem, at)
@@ -132,11 +133,11 @@ class RestShapeSolver:
             raise InvalidValue(
                 "shape",
                 f"disk {disk}",
-                f"clear of obstacle {name!r} (it is {depth * 1e3:.4g} mm inside; a best fit may be"
-                " asked for)",
+                f"clear of obstacle {name!r} (it is {depth * 1e3:.4g} mm inside); `best_fit`, or"
+                " --fit, finds the nearest",
             )
         forces = pushes(problem, at, presses)
-        statics = RestStatics(problem, fit.y, given, forces, bending, twist)
+        statics = RestStatics(problem, fit.y, given, forces, *largest)
         shapes: list[RestShape] = []
         pushing: list[str] = []
         held: list[str] = []
@@ -151,6 +152,10 @@ class RestShapeSolver:
                 else:
                     shapes.append(self._shape(statics, tensions, forces, shape, fit))
         shapes.sort(key=lambda s: float(s.tensions.max(initial=0.0)))
+        tight = [_too_tight(s, limit) for s in shapes if s.largest_curvature > limit]
+        shapes = [s for s in shapes if s.largest_curvature <= limit]
+        if tight and not shapes:
+            return RestDesign((), tuple(tight), fit)
         # What cables cannot do matters where there is nothing that they can.
         refused = [] if shapes else [_out_of_reach(statics, given, finger), *pushing, *held]
         return RestDesign(tuple(shapes), tuple(dict.fromkeys(refused)), fit)
@@ -164,32 +169,47 @@ class RestShapeSolver:
         fit: PoseFit,
     ) -> RestShape:
         rest = statics.rest(tensions)
-        ends = statics.curvature_ends(rest)
-        curvature = ends.reshape(shape.segments, 2 * PIECES, 3)
+        curvature = curvature_ends(self.problem, rest).reshape(shape.segments, 2 * PIECES, 3)
         problem = self.problem.with_rest_curvature(curvature)
-        finger, length = problem.finger, problem.finger.length
         table = np.zeros((len(problem.obstacles), len(problem.points.labels)))
         for push in forces:
             table[push.obstacle, push.point] = push.force
         point = derive(problem, problem.evaluate(fit.y - rest), tensions, table)
-        rest_lengths = problem.rest_lengths * length
-        centres = problem.points.backbone
-        gaps = problem.rest.distances[:, ~problem.fixed]
-        return RestShape(
-            finger=finger,
-            pulls=rest_lengths - point.at.lengths * length - _spare(statics, tensions) * length,
-            rest_lengths=rest_lengths,
-            tensions=tensions * finger.bending_stiffness / length**2,
-            rest=problem.rest.points[centres] * length,
-            actuated=point.at.points[centres] * length,
-            frames=point.at.rod.rotations[::PIECES],
-            energy=0.5 * float(point.at.y @ point.at.y) * finger.bending_stiffness / length,
-            largest_curvature=float(np.hypot(ends[:, 0], ends[:, 1]).max()),
-            rest_gap=float(gaps.min(initial=np.inf)) * length,
-            residual=point.residual,
-            smallest_eigenvalue=softest_direction(point)[0],
-            squared_error=fit.squared_error,
-        )
+        spare = np.where(tensions > 0, 0.0, np.maximum(statics.missing(tensions)[0], 0.0))
+        pulls = (problem.rest_lengths - point.at.lengths - spare) * problem.finger.length
+        return rest_shape_at(problem, point, pulls, fit.squared_error)
+
+
+def rest_shape_at(
+    problem: EquilibriumProblem, point: KktPoint, pulls: np.ndarray, squared_error: float
+) -> RestShape:
+    """Return the rest shape of a problem with an equilibrium of it, in metres and newtons."""
+    finger, length = problem.finger, problem.finger.length
+    centres, arcs = problem.points.backbone, problem.arcs_per_segment
+    bending = np.linalg.norm(finger.rest_curvature_ends[..., :2], axis=-1)
+    gaps = problem.rest.distances[:, ~problem.fixed]
+    return RestShape(
+        finger=finger,
+        pulls=pulls,
+        rest_lengths=problem.rest_lengths * length,
+        tensions=point.tensions * finger.bending_stiffness / length**2,
+        rest=problem.rest.points[centres] * length,
+        actuated=point.at.points[centres] * length,
+        frames=point.at.rod.rotations[::arcs],
+        energy=0.5 * float(point.at.y @ point.at.y) * finger.bending_stiffness / length,
+        largest_curvature=float(bending.max()),
+        rest_gap=float(gaps.min(initial=np.inf)) * length,
+        residual=point.residual,
+        smallest_eigenvalue=softest_direction(point)[0],
+        squared_error=squared_error,
+    )
+
+
+def _too_tight(shape: RestShape, limit: float) -> str:
+    return (
+        f"the one for a tension of {shape.tensions.max():.4g} bends by"
+        f" {shape.largest_curvature:.4g} 1/m at rest, more than the {limit:.4g} 1/m allowed"
+    )
 
 
 def _pushing(finger: Finger, tensions: np.ndarray) -> str:
@@ -212,8 +232,13 @@ def _held(finger: Finger, spare: np.ndarray, short: Sequence[int]) -> str:
     )
 
 
-def _checked_pulls(finger: Finger, pulls: Mapping[str, Pull]) -> list[Pull]:
-    """Return a pull for each cable; 0 for those not named."""
+def checked_pulls(finger: Finger, pulls: Mapping[str, Pull]) -> list[Pull]:
+    """Return a pull for each cable; 0 for those not named.
+
+    Raises:
+        UnknownName: A cable that the finger does not have.
+        InvalidValue: No `Pull`, not finite, or more than a cable can be pulled.
+    """
     for name, pull in pulls.items():
         if name not in finger.cable_names:
             raise UnknownName("cable", name, finger.cable_names)
@@ -227,15 +252,14 @@ def _checked_pulls(finger: Finger, pulls: Mapping[str, Pull]) -> list[Pull]:
     return [pulls.get(name, Pull(0.0)) for name in finger.cable_names]
 
 
-def _spare(statics: RestStatics, tensions: np.ndarray) -> np.ndarray:
-    """By how much (m,) a slack cable could be shorter (units of L)."""
-    return np.where(tensions > 0, 0.0, np.maximum(statics.missing(tensions)[0], 0.0))
-
-
 def _out_of_reach(statics: RestStatics, given: Sequence[Pull], finger: Finger) -> str:
     """Why no tensions were found: for one cable, the pulls between the bounds are told."""
     bending = statics.limits[0]
     line = f"no tensions give these pulls while the rest shape bends by less than {bending:.4g} 1/m"
+    ends = curvature_ends(statics.problem, statics.free_rest)
+    tightest = float(np.hypot(ends[:, 0], ends[:, 1]).max())
+    if tightest >= bending:
+        return f"{line}; the shape itself bends by {tightest:.4g} 1/m"
     if len(given) > 1:
         return f"{line}: pull less, or differently"
     unit = np.ones(1)

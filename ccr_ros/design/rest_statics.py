@@ -81,8 +81,8 @@ class RestStatics:
         self._offset = np.array([0.0 if p.relative else p.value / length for p in pulls])
         self._offset = self._offset + self.at.lengths
         self.limits = bending, twist
-        self._base = self.curvature_ends(self.free_rest)
-        self._slopes = np.array([self.curvature_ends(row) for row in self.pull_rows])
+        self._base = curvature_ends(problem, self.free_rest)
+        self._slopes = np.array([curvature_ends(problem, row) for row in self.pull_rows])
 
     def rest(self, tensions: np.ndarray) -> np.ndarray:
         """Return r (N,) for tensions (m,), equation (1)."""
@@ -99,13 +99,6 @@ class RestStatics:
         value = self._factor * at.lengths - self._offset
         return value, self._factor[:, None] * (rows @ self.pull_rows.T)
 
-    def curvature_ends(self, y: np.ndarray) -> np.ndarray:
-        """Return the curvature (2 E, 3) [1/m] at the start and the end of every arc."""
-        problem = self.problem
-        z = y.reshape(problem.arcs, 2, 3) * problem.coordinate_scale.reshape(2, 3)
-        z = z / (problem.rod_step * problem.finger.length)
-        return np.stack([z[:, 0] - z[:, 1], z[:, 0] + z[:, 1]], axis=1).reshape(-1, 3)
-
     def reach(self, start: np.ndarray, way: np.ndarray) -> float:
         """Return how far from tensions (m,) along a way (m,) the rest curvature stays in bounds."""
         here = self._base + np.tensordot(start, self._slopes, 1)
@@ -121,3 +114,10 @@ class RestStatics:
             turn = (twist - np.sign(slope[:, 2]) * here[:, 2]) / np.abs(slope[:, 2])
         found = np.concatenate([bend[a > 1e-24], turn[np.abs(slope[:, 2]) > 1e-12], [math.inf]])
         return float(found.min())
+
+
+def curvature_ends(problem: EquilibriumProblem, y: np.ndarray) -> np.ndarray:
+    """Return the curvature (2 E, 3) [1/m] at the start and the end of every arc, at y (N,)."""
+    z = y.reshape(problem.arcs, 2, 3) * problem.coordinate_scale.reshape(2, 3)
+    z = z / (problem.rod_step * problem.finger.length)
+    return np.stack([z[:, 0] - z[:, 1], z[:, 0] + z[:, 1]], axis=1).reshape(-1, 3)

@@ -88,12 +88,11 @@ class DesiredShape:
         """Return the paper's Eq. 7, the sum of the squared disk errors [m^2]."""
         return float(np.sum((np.asarray(backbone) - self.points) ** 2))
 
-    def check_fits(self, finger: Finger) -> None:
-        """Check that the finger's inextensible segments can span the points.
+    def check_count(self, finger: Finger) -> None:
+        """Check that there is one point for each disk of the finger.
 
         Raises:
-            InvalidValue: Another number of disks, or neighbours farther apart than a segment is
-                long, saying which and by how much.
+            InvalidValue: There is not.
         """
         if self.segments != finger.segments:
             raise InvalidValue(
@@ -102,6 +101,15 @@ class DesiredShape:
                 f"{finger.segments + 1} points, one per disk of finger {finger.name!r}"
                 f" (got {len(self.points)})",
             )
+
+    def check_fits(self, finger: Finger) -> None:
+        """Check that the finger's inextensible segments can span the points.
+
+        Raises:
+            InvalidValue: Another number of disks, or neighbours farther apart than a segment is
+                long, saying which and by how much.
+        """
+        self.check_count(finger)
         spans = np.linalg.norm(np.diff(self.points, axis=0), axis=1)
         over = spans / finger.segment_length - 1.0
         worst = int(np.argmax(over))

@@ -4,14 +4,13 @@
 from __future__ import annotations
 
 import itertools
-import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
 from .rest_statics import RestStatics
 
-_SAMPLES = 24  # of one cable's tension, values and slopes
+_SAMPLES = 12  # of one cable's tension, values and slopes
 _STARTS = 4  # per cable, where there are several
 _MOST_STARTS = 64
 _NEWTON = 40
@@ -53,56 +52,59 @@ def _scan(statics: RestStatics, cable: int, count: int) -> list[np.ndarray]:
         return []
     # Quadratic spacing: the first root, at a small tension, is the one that is mostly wanted.
     grid = end * (np.arange(_SAMPLES + 1) / _SAMPLES) ** 2
-    values = [statics.missing(t * unit) for t in grid]
-    g = np.array([v[cable] for v, _ in values])
-    slope = np.array([j[cable, cable] for _, j in values])
+
+    def missing(t: float) -> tuple[float, float]:
+        values, slopes = statics.missing(t * unit)
+        return float(values[cable]), float(slopes[cable, cable])
+
+    nodes = [(float(t), *missing(float(t))) for t in grid]
     found: list[np.ndarray] = []
-    for k in range(_SAMPLES):
-        for low, high in _brackets(grid[k : k + 2], g[k : k + 2], slope[k : k + 2]):
-            root = _bracketed(statics, cable, unit, low, high)
-            if root is not None and not any(_same(root, other) for other in found):
+    for low, high in itertools.pairwise(nodes):
+        for part in _parts(low, high, missing):
+            root = _bracketed(missing, *part) * unit
+            if not any(_same(root, other) for other in found):
                 found.append(root)
     return found
 
 
-def _brackets(t: np.ndarray, g: np.ndarray, slope: np.ndarray) -> list[tuple[float, float]]:
-    """Parts of a step on which g changes its sign; two where it comes back in between.
+_Node = tuple[float, float, float]  # tension, value, slope
+
+
+def _parts(
+    low: _Node, high: _Node, missing: Callable[[float], tuple[float, float]]
+) -> list[tuple[_Node, _Node]]:
+    """Parts of a step on which the value changes its sign; two where it comes back in between.
 
     It may do so where the slopes at both ends are unlike and point to 0: the turning point of the
     cubic through values and slopes then splits the step.
     """
-    if g[0] * g[1] < 0:
-        return [(float(t[0]), float(t[1]))]
-    if slope[0] * g[0] < 0 and slope[1] * g[1] > 0:
-        h = t[1] - t[0]
-        d = (g[1] - g[0]) / h
-        a, b = slope[0] + slope[1] - 2 * d, 3 * d - 2 * slope[0] - slope[1]
-        roots = np.roots([3 * a, 2 * b, slope[0]])
-        inside = [float(r.real) for r in roots if abs(r.imag) < 1e-12 and 0 < r.real < 1]
-        return [(float(t[0]), t[0] + h * r) for r in inside] + [
-            (t[0] + h * r, float(t[1])) for r in inside
-        ]
+    if low[1] * high[1] < 0:
+        return [(low, high)]
+    if low[2] * low[1] < 0 and high[2] * high[1] > 0:
+        h = high[0] - low[0]
+        d = (high[1] - low[1]) / h
+        a, b = low[2] + high[2] - 2 * d, 3 * d - 2 * low[2] - high[2]
+        for root in np.roots([3 * a, 2 * b, low[2]]):
+            if abs(root.imag) < 1e-12 and 0 < root.real < 1:
+                t = low[0] + h * float(root.real)
+                middle = (t, *missing(t))
+                if middle[1] * low[1] < 0:
+                    return [(low, middle), (middle, high)]
     return []
 
 
-def _bracketed(
-    statics: RestStatics, cable: int, unit: np.ndarray, low: float, high: float
-) -> np.ndarray | None:
-    """Newton's method kept between a change of sign; None if there is none."""
-    sign = math.copysign(1.0, statics.missing(low * unit)[0][cable])
-    value = statics.missing(high * unit)[0][cable]
-    if sign * value > 0:
-        return None
-    t = 0.5 * (low + high)
+def _bracketed(missing: Callable[[float], tuple[float, float]], low: _Node, high: _Node) -> float:
+    """Newton's method kept between a change of sign, from where the chord is 0."""
+    a, b = low[0], high[0]
+    t = (a * high[1] - b * low[1]) / (high[1] - low[1])
     for _ in range(_NEWTON):
-        values, slopes = statics.missing(t * unit)
-        g, slope = float(values[cable]), float(slopes[cable, cable])
-        if abs(g) < _ZERO:
+        value, slope = missing(t)
+        if abs(value) < _ZERO:
             break
-        low, high = (t, high) if g * sign > 0 else (low, t)
-        step = t - g / slope if slope else low
-        t = step if low < step < high else 0.5 * (low + high)
-    return t * unit
+        a, b = (t, b) if value * low[1] > 0 else (a, t)
+        step = t - value / slope if slope else a
+        t = step if a < step < b else 0.5 * (a + b)
+    return t
 
 
 def _starts(statics: RestStatics, index: np.ndarray, count: int) -> Iterator[np.ndarray]:

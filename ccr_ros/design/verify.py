@@ -31,6 +31,7 @@ class PullPath:
         jumps: Fractions of the pulls at which the finger snapped to another branch.
         unstable: Fractions of the pulls at which the pose was no strict minimum of the energy.
         message: What ended the path, if it ended early.
+        tolerance: Largest squared error that counts as reached [m^2].
     """
 
     steps: tuple[Solution, ...]
@@ -39,6 +40,7 @@ class PullPath:
     jumps: tuple[float, ...]
     unstable: tuple[float, ...]
     message: str
+    tolerance: float = TOLERANCE
 
     @property
     def last(self) -> Solution:
@@ -52,8 +54,8 @@ class PullPath:
 
     @property
     def reached(self) -> bool:
-        """Whether the pulls lead to the wanted shape, to the paper's own tolerance."""
-        return self.completed and self.squared_error <= TOLERANCE
+        """Whether the pulls lead to the wanted shape, within the tolerance."""
+        return self.completed and self.squared_error <= self.tolerance
 
     @property
     def smooth(self) -> bool:
@@ -62,7 +64,11 @@ class PullPath:
 
 
 def pull_from_rest(
-    finger: Finger, pulls: np.ndarray, shape: DesiredShape, steps: int = 10
+    finger: Finger,
+    pulls: np.ndarray,
+    shape: DesiredShape,
+    steps: int = 10,
+    tolerance: float = TOLERANCE,
 ) -> PullPath:
     """Pull a finger from rest, obstacles and all, with the solver that the nodes use.
 
@@ -71,6 +77,7 @@ def pull_from_rest(
         pulls: (m,) [m].
         shape: What the last pose is compared with.
         steps: In which the pulls are made; the solver goes in smaller ones where it must.
+        tolerance: Largest squared error that counts as reached [m^2]; by default the paper's.
 
     Raises:
         InvalidValue: A pull that the finger cannot have.
@@ -98,4 +105,5 @@ def pull_from_rest(
         tuple(jumps),
         tuple(unstable),
         message,
+        tolerance,
     )

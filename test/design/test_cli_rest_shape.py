@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -97,6 +98,42 @@ def test_what_is_not_reached_gives_exit_code_1(ccr):
     assert "at most" in result["refused"][0]
 
 
+def test_constant_curvature_is_a_best_fit_whose_error_is_told(ccr, tmp_path):
+    path = tmp_path / "out.yaml"
+    words = ["sphere_finger", "--curve", SPHERE, "--pull", "main=3%", "--rest", "constant"]
+    code, out, _ = ccr("design", "rest-shape", *words, "-o", path)
+    assert code == 1 and "NOT REACHED from rest" in out and "RMS 0.0124 mm" in out
+    assert "best fit: from 2.1 mm2 to 0.0014 mm2" in out
+    assert np.shape(load_finger(path).rest_curvature) == (9, 3)
+    code, out, _ = ccr("design", "rest-shape", *words, "--tolerance", "0.01", "--json")
+    result = json.loads(out)
+    assert code == 0 and result["reached"] is True
+    (shape,) = result["shapes"]
+    assert shape["forward"]["tolerance"] == pytest.approx(1e-8)
+    assert shape["fit"]["optimal"] and shape["fit"]["first_error"] > 1e-6
+
+
+def test_a_bound_that_equilibrium_breaks_and_a_fit_keeps(ccr):
+    words = ["sphere_finger", "--curve", SPHERE, "--pull", "main=3%", "--max-curvature", "12"]
+    code, out, _ = ccr("design", "rest-shape", *words)
+    assert code == 1 and "13.09 1/m at rest, more than the 12 1/m allowed" in out
+    code, out, _ = ccr("design", "rest-shape", *words, "--fit", "--steps", "3")
+    assert code == 0 and "rest bends by 12 1/m at most" in out
+    assert "bend as far as allowed" in out
+
+
+def test_a_shape_in_an_obstacle_is_refused_with_the_way_out(ccr, tmp_path):
+    from design.test_rest_shape import BALL
+
+    finger = sphere_finger(obstacles=(replace(BALL, radius=0.058),))
+    path = write_finger(finger, tmp_path / "ball.yaml")
+    words = [path, "--curve", SPHERE, "--pull", "main=3%"]
+    code, _, err = ccr("design", "rest-shape", *words)
+    assert code == 2 and "clear of obstacle 'ball'" in err and "--fit, finds the nearest" in err
+    code, out, _ = ccr("design", "rest-shape", *words, "--fit", "--steps", "3")
+    assert code == 1 and "NOT REACHED" in out and "a least error" in out
+
+
 def test_plot_draws_a_picture(ccr, tmp_path):
     pytest.importorskip("matplotlib")
     path = tmp_path / "found.png"
@@ -132,6 +169,8 @@ CURVE = ["--curve", "arc:60"]
         (["straight", *CURVE, "--pull", "main=3%", "--steps", "0"], "--steps: '0'"),
         (["straight", *CURVE, "--pull", "main=3%", "--max-curvature", "-1"], "--max-curvature"),
         (["straight", *CURVE, "--pull", "main=3%", "--max-curvature", "999"], "max_curvature"),
+        (["straight", *CURVE, "--pull", "main=3%", "--tolerance", "-1"], "--tolerance: '-1'"),
+        (["straight", *CURVE, "--pull", "main=3%", "--fit", "--press", "7=1"], "left out of a"),
         (["straight", *CURVE, "--pull", "main=3%", "--plot", "a.xyz"], "'a.xyz'"),
         (["straight", *CURVE, "--pull", "main=3%", "-o", "no/such/a.yaml"], "cannot be written"),
         (["straight", "--curve", "arc:no", "--pull", "main=3%"], "'no' is not allowed"),
