@@ -94,7 +94,7 @@ def declare(node: Node) -> ServoParameters:
     )
     settings = _bridge(own)
     _loopback(own)
-    seed = own.fixed("loopback.seed", 0, "Seed of the simulated noise.", (0, 2**31 - 1))
+    seed = own.fixed("loopback.seed", 0, "Seed of the simulated noise.", (0, 1_000_000))
     state_file = own.fixed(
         "loopback.state_file",
         "",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""docs/interfaces.md says what the running node does."""
+"""docs/interfaces.md says what the running nodes do."""
 
 from pathlib import Path
 
@@ -8,7 +8,10 @@ from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, ReliabilityPolicy
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "interfaces.md"
-NOT_OURS = {"/rosout", "/parameter_events"}
+# Those of every node, and of every managed one.
+NOT_OURS = ("/rosout", "/parameter_events", "/gripper/servo_bridge_node/transition_event")
+MANAGED = ("change_state", "get_state", "get_available_states", "get_available_transitions")
+MANAGED = {f"/gripper/servo_bridge_node/{name}" for name in (*MANAGED, "get_transition_graph")}
 CABLES = {"thumb": ("straight", "helical"), "index": ("main",)}
 TYPES = {
     Parameter.Type.STRING: "string",
@@ -18,9 +21,17 @@ TYPES = {
 }
 
 
-def table(first_column):
-    """Return the rows of the table with this first heading, as dictionaries by heading."""
+def section(node):
+    """Return the lines of a node's section."""
     lines = PAGE.read_text(encoding="utf-8").splitlines()
+    start = lines.index(f"## {node}")
+    ends = [i for i, line in enumerate(lines) if i > start and line.startswith("## ")]
+    return lines[start : ends[0] if ends else None]
+
+
+def table(node, first_column):
+    """Return the rows of the table with this first heading, as dictionaries by heading."""
+    lines = section(node)
     start = next(i for i, line in enumerate(lines) if line.startswith(f"| {first_column} |"))
     headings = cells(lines[start])
     rows = []
@@ -35,16 +46,33 @@ def cells(line):
     return [cell.strip().strip("`") for cell in line.strip("|").split("|")]
 
 
-@pytest.fixture
-def node(start, small_gripper):
-    return start(gripper_file=small_gripper)
+# The nodes that the page is about, and what is set for them here.
+NODES = {
+    "solver_node": ("start", "small_gripper", {"gripper_file"}),
+    "servo_bridge_node": (
+        "start_bridge",
+        "small_rack",
+        {"gripper_file", "servo_file", "calibration_file", "loopback.spring"},
+    ),
+}
+
+
+@pytest.fixture(params=list(NODES))
+def node(request):
+    start, files, _ = NODES[request.param]
+    values = request.getfixturevalue(files)
+    if isinstance(values, str):
+        values = {"gripper_file": values}
+    else:
+        values = {**values, "loopback__spring": 400.0}
+    return request.getfixturevalue(start)(**values)
 
 
 def qos_text(qos):
-    assert qos.reliability == ReliabilityPolicy.RELIABLE
     assert qos.history == HistoryPolicy.KEEP_LAST
     latched = qos.durability == DurabilityPolicy.TRANSIENT_LOCAL
-    return f"reliable, keep last {qos.depth}, {'latched' if latched else 'volatile'}"
+    reliable = "reliable" if qos.reliability == ReliabilityPolicy.RELIABLE else "best effort"
+    return f"{reliable}, keep last {qos.depth}, {'latched' if latched else 'volatile'}"
 
 
 def type_text(kind):
@@ -52,8 +80,8 @@ def type_text(kind):
     return f"{package}/{module}/{kind.__name__}"
 
 
-def documented(direction):
-    for row in table("topic"):
+def documented(node, direction):
+    for row in table(node, "topic"):
         if row["direction"] != direction:
             continue
         name = row["topic"] if row["topic"].startswith("/") else f"/gripper/{row['topic']}"
@@ -71,7 +99,7 @@ def test_topics(node, direction):
         for e in endpoints
         if e.topic_name not in NOT_OURS
     }
-    assert found == dict(documented(direction))
+    assert found == dict(documented(node.get_name(), direction))
 
 
 def services(node):
@@ -79,29 +107,48 @@ def services(node):
 
 
 def test_services(node, probe):
+    name = node.get_name()
     documented = {
-        row["service"].replace("~", "/gripper/solver_node"): row["type"] for row in table("service")
+        row["service"].replace("~", f"/gripper/{name}"): row["type"]
+        for row in table(name, "service")
     }
     of_every_node = {
-        name.replace("/probe/", "/solver_node/"): kind
-        for name, kind in services(probe.node).items()
+        service.replace("/probe/", f"/{name}/"): kind
+        for service, kind in services(probe.node).items()
     }
-    assert documented.items() == services(node).items() - of_every_node.items()
+    found = services(node).items() - of_every_node.items()
+    assert documented.items() == {(s, kind) for s, kind in found if s not in MANAGED}
 
 
 def parameter_names(node):
     return {p.name for p in node.get_parameters_by_prefix("").values()}
 
 
+def default_text(value):
+    if isinstance(value, bool):
+        return str(value).lower()
+    return str(value) or "empty"
+
+
 def test_parameters(node, probe):
-    rows = {row["parameter"]: row for row in table("parameter")}
+    rows = {row["parameter"]: row for row in table(node.get_name(), "parameter")}
+    set_here = NODES[node.get_name()][2]
     assert parameter_names(node) - parameter_names(probe.node) == set(rows)
     for name, row in rows.items():
         parameter, descriptor = node.get_parameter(name), node.describe_parameter(name)
         assert row["type"] == TYPES[parameter.type_], name
         assert row["read-only"] == ("yes" if descriptor.read_only else "no"), name
-        if name != "gripper_file":  # the fixture sets it
-            assert row["default"] == str(parameter.value).replace("True", "true"), name
+        if name not in set_here:
+            assert row["default"] == default_text(parameter.value), name
         ranges = [*descriptor.integer_range, *descriptor.floating_point_range]
         limits = f"{ranges[0].from_value:g} to {ranges[0].to_value:g}" if ranges else ""
         assert row["range"] == (limits or descriptor.additional_constraints or "-"), name
+
+
+def test_joint_states_are_read_where_ros2_control_tells_them(start_bridge, small_rack):
+    node = start_bridge(**small_rack, driver="ros2_control", autostart=False)
+    topic = "/gripper/joint_states"
+    (heard,) = (s for s in node.subscriptions if s.topic_name == topic)
+    assert qos_text(heard.qos_profile) in " ".join(section("servo_bridge_node"))
+    assert topic not in {p.topic_name for p in node.publishers}
+    assert "/gripper/thumb/state" not in {s.topic_name for s in node.subscriptions}

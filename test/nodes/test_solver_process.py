@@ -1,58 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """The solver node as a process of its own: on the graph, at its end, and when it cannot start."""
 
-import os
 import signal
-import subprocess
-import sys
-from pathlib import Path
 
 import pytest
+from node_processes import WAIT, end, failed_start, launcher
 from probe import shown
 from visualization_msgs.msg import MarkerArray
-
-ROOT = Path(__file__).resolve().parents[2]
-RUN = "import sys; from ccr_ros.nodes.entry import solver_node; sys.exit(solver_node())"
-WAIT = 90.0  # s; never reached when all is well
-
-
-def command(*ros_args, script=RUN):
-    return [sys.executable, "-c", script, "--ros-args", *ros_args]
-
-
-def environment():
-    paths = [str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]
-    return {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
 
 
 @pytest.fixture
 def launch():
     """Return a function that starts a solver node in a process; none is left behind."""
-    running = []
-
-    def launch(*ros_args, script=RUN):
-        process = subprocess.Popen(
-            command(*ros_args, script=script),
-            env=environment(),
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-        running.append(process)
-        return process
-
-    yield launch
-    for process in running:
-        if process.poll() is None:
-            process.kill()
-        process.communicate()
-
-
-def end(process, how):
-    process.send_signal(how)
-    _, errors = process.communicate(timeout=WAIT)
-    assert "Traceback" not in errors
-    return process.returncode
+    yield from launcher("solver_node")
 
 
 @pytest.mark.processes
@@ -116,18 +76,4 @@ sys.exit(solver_node())
     ],
 )
 def test_what_cannot_start_says_why_in_one_line(arguments, text):
-    done = subprocess.run(
-        command(*arguments),
-        env=environment(),
-        capture_output=True,
-        text=True,
-        timeout=WAIT,
-        check=False,
-    )
-    assert done.returncode == 1
-    assert "Traceback" not in done.stderr
-    *before, line = done.stderr.strip().splitlines()
-    # Real ROS logs of its own, and the transport within one process says what it is.
-    assert all("[rcl]" in one or "embedded_ros: " in one for one in before)
-    assert line.startswith("solver_node: error: ")
-    assert text in line
+    assert text in failed_start("solver_node", *arguments)
