@@ -69,10 +69,10 @@ def test_the_papers_sphere_finger():
     assert not last.contacts  # it lies on the ball, and does not press on it
     gaps = BALL.signed_distance(last.cables["main"][5:])
     assert np.abs(gaps).max() < 1e-9  # disks of radius a: the backbone runs a above the ball
-    # The hand-made finger of config/ is the same but for its segments' constant curvature.
+    # An earlier answer, made by hand for constant curvature, was alike on the contour.
     means = np.asarray(found.finger.rest_curvature).mean(axis=1)
-    made = load_finger(find_config("sphere_finger")).rest_curvature
-    assert means[6:] == pytest.approx(made[6:], abs=1.5)
+    assert means[6:, 1] == pytest.approx([10.661, 12.116, 11.745], abs=1.5)
+    assert np.abs(means[:, [0, 2]]).max() < 1e-9
 
 
 def test_it_presses_with_the_forces_that_are_asked_for():
