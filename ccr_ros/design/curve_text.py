@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..model import checks
 from ..model.errors import InvalidValue, UnknownName
 from ..model.finger import Finger
 from .contours import Section, contour
@@ -105,7 +106,10 @@ def curve_from_text(text: str, finger: Finger, unit: str = "m") -> Curve:
         "s": lambda: s_curve(length, math.radians(size[0]), direction),
         "helix": lambda: helix(length, size[0], options["turns"], direction),
     }
+    largest = {"arc": 360.0, "s": 180.0}.get(family)
     try:
+        if largest:
+            checks.real("angle", size[0], low=-largest, high=largest, unit="deg")
         if family in makers:
             return makers[family]()
         body = SizedObject(family, size, options.get("corner"))

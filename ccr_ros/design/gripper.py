@@ -31,6 +31,7 @@ from .target import DesiredShape
 from .verify import PullPath, pull_from_rest
 
 TOUCHING = 1e-5  # m; a disk no farther off the object touches it
+_BEYOND = 0.25  # of a segment; so far from the object's middle a disk must touch, to either side
 _STEPS = 10  # of the pull, in the forward proof
 
 
@@ -187,7 +188,8 @@ def wanted_curve(task: GripperTask, section: Section) -> tuple[Curve, LeadIn]:
 
     def both_sides(lead: LeadIn) -> bool:
         on = positions(lead)
-        return len(on) > 0 and on[0] < 0 < on[-1]
+        far = _BEYOND * finger.segment_length
+        return len(on) > 0 and on[0] <= -far and on[-1] >= far
 
     if task.join is None:
         lead = least_lead_in(wanted)

@@ -15,7 +15,7 @@ from ..model.finger import Finger
 from ..model.result import disk_overlap
 from ..model.settings import SolverSettings
 
-_STEPS = 16  # backbone points per segment
+_STEPS = 16  # backbone points per segment, at least
 _SAME = 1e-9  # rad; holes no farther apart are one
 
 
@@ -110,15 +110,16 @@ def finger_parts(finger: Finger, options: PrintOptions | None = None) -> FingerP
     options = options or PrintOptions()
     if options.outer_radius is None:
         options = replace(options, outer_radius=finger.disk_radius + options.hole_diameter)
-    rest = EquilibriumProblem(
+    problem = EquilibriumProblem(
         replace(finger, obstacles=()), SolverSettings(arcs_per_segment=_STEPS)
-    ).rest.rod
+    )
+    rest = problem.rest.rod
     parts = FingerParts(
         finger=finger,
         options=options,
         centers=rest.positions * finger.length,
         frames=rest.rotations,
-        disks=np.arange(finger.segments + 1) * _STEPS,
+        disks=np.arange(finger.segments + 1) * problem.arcs_per_segment,
         holes=_holes(finger, options),
     )
     _check_disk(parts)

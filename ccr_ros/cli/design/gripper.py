@@ -22,6 +22,7 @@ import json
 import shlex
 import sys
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -108,9 +109,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Design, write and print; return the exit code."""
-    for path in (args.plot, args.strip):
+    for path in (args.plot, args.strip):  # before any work is done
         if path:
-            checked_path(path)  # before any work is done
+            made = Path(path).parent == Path(args.out)  # that folder may not be there yet
+            checked_path(Path(path).name if made else path)
     options = options_from_args(args)
     task = _task(args)
     kind = task.layout.body.kind
