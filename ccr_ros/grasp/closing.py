@@ -92,8 +92,10 @@ class Closing:
             return
         if not self._grip.touches(finger):
             self._touching.discard(finger.name)
-            limit = max(self.limit(finger), finger.place)
-            advance(finger, limit, self._speed(finger), seconds, self._settings.max_lead)
+            # What it may meet is known up to the newest pose only.
+            place = min(self.limit(finger), finger.solved_place + self._settings.blind_lead)
+            place = max(place, finger.place)
+            advance(finger, place, self._speed(finger), seconds, self._settings.max_lead)
             return
         begins = finger.name not in self._touching
         self._touching.add(finger.name)
@@ -105,7 +107,7 @@ class Closing:
         target = self._target
         if self._grip.committed:
             target = max(target, self._grip.force(finger))
-        self._grip.regulate(finger, target, seconds)
+        self._grip.regulate(finger, target)
 
     def _speed(self, finger: FingerControl) -> float:
         goal, settings = self._goal, self._settings
@@ -151,7 +153,7 @@ class Closing:
         at_floor = finger.place <= self._grip.floors.get(finger.name, -math.inf)
         kept = self._grip.committed or at_floor
         most = math.inf if kept else self._goal.force + tolerance
-        return self._goal.force - tolerance <= force <= most
+        return self._grip.known(finger) and self._goal.force - tolerance <= force <= most
 
     def _verdict(self, now: float) -> Verdict | None:
         needed, settings = self._grip.needed, self._settings

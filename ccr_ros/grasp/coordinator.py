@@ -217,7 +217,7 @@ class GripperCoordinator:
         elif self.state is State.CLOSING and self._closing is not None:
             self._take(self._closing.step(now, seconds), now)
         elif self.state is State.HOLDING:
-            self._hold_on(now, seconds)
+            self._hold_on(now)
         if self._grasp is not None and now - self._grasp.started > self._grasp.goal.timeout:
             self._time_out()
 
@@ -263,8 +263,8 @@ class GripperCoordinator:
             self._end_all(trouble, stalled=True)
             self._freeze(Event.STOP, trouble)
 
-    def _hold_on(self, now: float, seconds: float) -> None:
-        if lost := self.grip.hold(now, seconds):
+    def _hold_on(self, now: float) -> None:
+        if lost := self.grip.hold(now):
             reason = f"{lost} lost the object"
             self._end_all(reason)
             self._freeze(Event.FAIL, reason)
@@ -273,7 +273,10 @@ class GripperCoordinator:
         if run is None:
             return
         tolerance = self.settings.force_tolerance
-        near = all(abs(self.grip.force(f) - run.goal.force) <= tolerance for f in self.grip.needed)
+        near = all(
+            abs(self.grip.force(f) - run.goal.force) <= tolerance and self.grip.known(f)
+            for f in self.grip.needed
+        )
         if self._pressed.holds(near and self.grip.complete, now, self.settings.settle_time):
             self._end_grasp(Outcome(End.DONE, "held with the new force", reached=True))
 

@@ -3,12 +3,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 from .finger_control import FingerControl
 from .progress import Lasting
 from .regulation import ForceLaw
 from .settings import GraspSettings
+
+_LONGEST_REGULATION = 0.1  # s that one pose may count for: see `ForceLaw`
 
 
 class Grip:
@@ -32,6 +35,7 @@ class Grip:
         self.targets: dict[str, float] = {}  # [N] of the fingers whose force is regulated
         self.floors: dict[str, float] = {}  # [m]
         self._lost = {name: Lasting() for name in fingers}
+        self._regulated: dict[str, float] = {}  # time of the pose that was last acted on, by finger
 
     def clear(self) -> None:
         """Forget the grip: a release begins."""
@@ -50,6 +54,13 @@ class Grip:
     def touches(self, finger: FingerControl) -> bool:
         """Tell whether a finger touches the object."""
         return self.force(finger) >= self._settings.contact_force
+
+    def known(self, finger: FingerControl) -> bool:
+        """Tell whether the newest pose is that of where the finger is, so that its force counts."""
+        solved = finger.solved
+        if solved is None or solved.stale:
+            return False
+        return abs(finger.solved_place - finger.measured_place) <= self._settings.place_tolerance
 
     def agrees(self, finger: FingerControl) -> bool:
         """Tell whether a finger touches, in a pose that is not stale, and its effort agrees."""
@@ -92,30 +103,33 @@ class Grip:
         self.committed = True
         self._lost = {name: Lasting() for name in self._fingers}
 
-    def regulate(self, finger: FingerControl, target: float, seconds: float) -> None:
-        """Move a finger's command so that its force comes nearer to a target.
+    def regulate(self, finger: FingerControl, target: float) -> None:
+        """Move a finger's command, once for each new pose, so that its force nears a target.
 
         Not at a pose that is stale. At one that is not stable no farther; before a grip is
-        committed back as far as the law wants, then only down to the floor.
+        committed back as far as the law wants, then only down to the floor. Never farther from
+        the newest pose than ``blind_lead``, so that a slow solver makes no force swing.
         """
+        before = self._regulated.get(finger.name, -math.inf)
+        seconds = min(finger.solved_at - before, _LONGEST_REGULATION)
+        self._regulated[finger.name] = finger.solved_at
         solved, settings = finger.solved, self._settings
-        if solved is None or solved.stale:
+        if solved is None or solved.stale or seconds <= 0.0:
             return
         step = self.law.step(self.force(finger), target, seconds)
-        at = finger.measured_place
-        high = min(finger.limit, max(finger.place, at + settings.max_lead))
+        high = min(finger.limit, finger.solved_place + settings.blind_lead)
+        low = finger.solved_place - settings.blind_lead
         if not solved.stable:
             high = finger.place
-        low = 0.0
         if self.committed:
-            low = self.floors.get(finger.name, finger.place)
-        low = min(low, finger.place)
+            low = max(low, self.floors.get(finger.name, finger.place))
+        low, high = min(max(low, 0.0), finger.place), max(high, finger.place)
         finger.place = min(max(finger.place + step, low), high)
 
-    def hold(self, now: float, seconds: float) -> str:
+    def hold(self, now: float) -> str:
         """Regulate all that hold; return the name of a required finger that lost touch, if any."""
         for name, target in self.targets.items():
-            self.regulate(self._fingers[name], target, seconds)
+            self.regulate(self._fingers[name], target)
         for finger in self.needed:
             lost = self._lost[finger.name]
             if lost.holds(not self.touches(finger), now, self._settings.loss_time):

@@ -77,6 +77,13 @@ class GraspSettings:
     force_dead_band: float = _setting(
         0.002, 0.0, 1e3, "N", "Differences of force that the regulation lets be."
     )
+    blind_lead: float = _setting(
+        0.0003,
+        1e-5,
+        0.1,
+        "m",
+        "Farthest that fingers close ahead of the newest solved pose: what they press on unawares.",
+    )
     max_lead: float = _setting(
         0.002, 1e-5, 0.1, "m", "Farthest that a command is ahead of the measured pull."
     )

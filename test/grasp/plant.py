@@ -49,6 +49,8 @@ class Plant:
         self.solved: dict[str, SolvedFinger] = {}
         self.lag = lag
         self.seconds = step
+        self.steps = 0
+        self.solve_every = 1  # steps
         self.now = 100.0
         self.bridge_silent = self.solver_silent = False
         self.stale: set[str] = set()
@@ -65,8 +67,10 @@ class Plant:
 
     def advance(self) -> None:
         self.now += self.seconds
+        self.steps += 1
         for name, finger in self.control.items():
-            if name in self.solved and not self.solver_silent:
+            solves = self.steps % self.solve_every == 0 and not self.solver_silent
+            if name in self.solved and solves:
                 self.control[name].hear_solved(self.solved[name], self.now)
             if self.gripper.commanding and not self.bridge_silent:
                 self.wanted[name] = finger.path.place(finger.command)
@@ -75,6 +79,8 @@ class Plant:
                 self.at[name] += way * -math.expm1(-self.seconds / self.lag)
             if not self.bridge_silent:
                 finger.hear_pulls(np.array([self.at[name]]), self.now)
+            if self.steps % self.solve_every:
+                continue
             force = self.force(name)
             tension = FREE * self.at[name] + SHARE * force * (name not in self.limp)
             self.solved[name] = SolvedFinger(

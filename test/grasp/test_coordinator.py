@@ -287,3 +287,21 @@ def test_refused_before_anything_is_known():
     plant.run(0.5)
     with pytest.raises(Refused, match="no state of finger_1 yet"):
         plant.grasp()
+
+
+@pytest.mark.parametrize("every", [5, 20])
+def test_a_slow_solver_makes_fingers_slow_and_not_rough(plant, every):
+    """Poses come 10 or 2.5 times a second: what is pressed unawares stays small."""
+    plant.solve_every = every
+    run = plant.grasp(force=0.2, speed=0.005, timeout=120.0)
+    most = 0.0
+    while run.outcome is None:
+        plant.advance()
+        most = max(most, *plant.forces())
+    assert run.outcome.reached
+    assert most < 720.0 * plant.settings.blind_lead + 0.05
+    plant.run(10.0)
+    np.testing.assert_allclose(plant.forces(), 0.2, atol=0.02)
+    plant.touch = dict.fromkeys(NAMES, TOUCH - 1e-4)
+    plant.run(10.0)
+    np.testing.assert_allclose(plant.forces(), 0.2, atol=0.02)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+import time
 from typing import Any
 
 from ccr_msgs.action import Grasp, Release
@@ -117,7 +118,11 @@ class Goal:
         return self._future.done()
 
     def result(self) -> Any:
-        self._stack.probe.until(lambda: self.over, "the goal's result")
+        deadline = time.monotonic() + 60.0  # never reached when all is well
+        while not self.over:
+            now = self._stack.now
+            assert time.monotonic() < deadline, f"{now.state}: {now.message}"
+            self._stack.probe.executor.spin_once(timeout_sec=0.05)
         self.status = self._future.result().status
         return self._future.result().result
 
@@ -131,12 +136,14 @@ class Goal:
 class GripperStack:
     """The nodes, and what a person does with them."""
 
-    def __init__(self, context: Context, probe: Probe, at: float = 0.0, **values: Any) -> None:
+    def __init__(
+        self, context: Context, probe: Probe, at: float = 0.0, bridge: Any = None, **values: Any
+    ) -> None:
         self.context = context
         self.probe = probe
         self._ended: list[Node] = []
         self.solver = probe.add(SolverNode(context=context, namespace="gripper"))
-        self.bridge = probe.add(FakeBridge(context, at))
+        self.bridge = bridge or probe.add(FakeBridge(context, at))
         self.node = self.start_coordinator(**values)
         self.clients = {
             kind: ActionClient(probe.node, kind, name)
