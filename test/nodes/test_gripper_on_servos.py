@@ -8,13 +8,14 @@ from ccr_msgs.msg import ServoState
 from gripper_stack import BALL, FINGERS, GripperStack
 
 pytestmark = pytest.mark.long
+PATIENT = dict.fromkeys(("bridge_timeout", "solver_timeout", "stale_timeout"), 20.0)  # s
 
 
 @pytest.fixture
 def chain(context, probe, start_bridge, servos):
     """The nodes, with calibrated servos."""
     bridge = start_bridge(rate=20.0)
-    stack = GripperStack(context, probe, bridge=bridge, close_speed=0.002)
+    stack = GripperStack(context, probe, bridge=bridge, close_speed=0.002, **PATIENT)
     servos.in_state(ServoState.ACTIVE)
     assert servos.calibrate().success
     yield stack
