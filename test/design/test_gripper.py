@@ -128,7 +128,7 @@ def test_the_join_can_be_chosen():
         ({"height": 0.2}, "length", "below and above the object's middle: with the gentlest lead"),
         ({"height": 0.2, "join": -0.01}, "length", "mm that lead to the contour"),
         ({"pulls": {"main": Pull(-0.05, True)}}, "pulls", "or the fingers would never open"),
-        ({"body": SizedObject("sphere", (0.02,)), "join": -0.005}, "length", "behind the object"),
+        ({"body": SizedObject("sphere", (0.02,)), "join": 0.0}, "length", "behind the object"),
         (
             {"body": SizedObject("cylinder", (0.06, 0.1)), "height": 0.1},
             "length",
