@@ -17,6 +17,7 @@ from .measure import OWN, Row, measure, set_error
 from .memory import measure_memory
 from .suites import memory_plans, plans
 from .table import table
+from .tracking import measure_track, tracks
 from .transport import connections, measure_connection
 
 
@@ -39,7 +40,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(table(rows))
         print(f"\n{len(rows)} rows in {seconds:.0f} s; {_machine()}")
     # Not the group "cable-model": with given spans a finger may have no pose clear of an obstacle.
-    ours = (r for r in rows if r.group == "discretisation" or (r.group, r.name) == ("sweep", OWN))
+    groups = ("sweep", "pulls")
+    ours = (r for r in rows if r.group == "discretisation" or (r.group in groups and r.name == OWN))
     return int(any(row.converged < row.samples for row in ours))
 
 
@@ -65,7 +67,8 @@ def run(quick: bool, pattern: str = "*") -> list[Row]:
         )
     ]
     sent = [row for plan in connections(quick) if wanted((row := plan.row()).id)]
-    total = len(timed) + len(memory) + len(sent)
+    tracked = [row for plan in tracks(quick) if wanted((row := plan.row()).id)]
+    total = len(timed) + len(memory) + len(sent) + len(tracked)
     rows: list[Row] = []
     for plan in timed:
         _progress(len(rows), total, plan.id)
@@ -75,6 +78,10 @@ def run(quick: bool, pattern: str = "*") -> list[Row]:
     for row in memory:
         _progress(len(rows), total, row.id)
         row.memory_mb = measure_memory(row.name, row.case, row.n)
+        rows.append(row)
+    for row in tracked:
+        _progress(len(rows), total, row.id)
+        measure_track(row, quick)
         rows.append(row)
     for row in sent:
         _progress(len(rows), total, row.id)

@@ -28,6 +28,7 @@ GROUPS: dict[str, str] = {
     "eq4": "Eq. 4 read literally, and as Eq. 1-3 mean it (IPOPT, cable spans given)",
     "cable-model": "Frictionless cable (total length given) or proportional spans (the paper's)",
     "discretisation": "Accuracy against arcs per segment and their order",
+    "pulls": "Pulls that follow a path of the tip (200 points; 25 if quick)",
     "memory": "Peak resident memory of build and five steps, above the imported libraries",
     "transport": "Messages between two processes, and a node that idles",
 }

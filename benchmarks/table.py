@@ -75,6 +75,8 @@ def table(rows: Sequence[Row]) -> str:
         "RMS: over disk centres at the end of the sweep, against the independent reference rod\n"
         "(% of the finger's length); with *, against ccr_ros: the reference has other disks.\n"
         "iter.: median per step.\n"
+        "pulls: a step is a point of the path, iter. how many poses are tried for it, and what\n"
+        "the tip is off by is a root mean square over the path.\n"
         "transport: p50, p99 from publish to callback, or of calling a service until its answer;\n"
         "cpu of both processes for one of them, or of an idle node in a second."
     )

@@ -17,6 +17,15 @@ from benchmarks.cases import CONTACT, TABLE_I, load_case, rms
 from benchmarks.measure import OwnSweeper, Plan, Row, measure
 from benchmarks.suites import COMPARED, GROUPS, cartesian, memory_plans, own, plans
 from benchmarks.table import table
+from benchmarks.tracking import (
+    CASES,
+    SOLVERS,
+    follower,
+    measure_track,
+    track_finger,
+    track_path,
+    tracks,
+)
 from ccr_ros.cli import bench
 from ccr_ros.cli.main import main as ccr_main
 
@@ -200,7 +209,8 @@ def test_full_plan_covers_what_is_promised():
         for n in (9, 30, 90):
             assert {f"sweep/{name}/n{n}/ccr_ros", f"sweep/{name}/n{n}/ipopt"} <= ids
         assert {f"sweep/{name}/n9/trust-constr", f"sweep/{name}/n9/slsqp"} <= ids
-    assert {plan.group for plan in plans(quick=False)} | {"memory", "transport"} == set(GROUPS)
+    others = {"memory", "transport", "pulls"}
+    assert {plan.group for plan in plans(quick=False)} | others == set(GROUPS)
     assert len(ids) == len(list(plans(quick=False)))
     assert len(set(memory_plans(quick=False))) == len(memory_plans(quick=False))
     for quick in (False, True):
@@ -234,6 +244,9 @@ def test_quick_bench_end_to_end():
         elif row.group == "transport":
             assert row.p99_ms >= row.p50_ms > 0
             assert row.cpu_ms > 0
+        elif row.group == "pulls":
+            assert row.steps == row.converged == row.steps_wanted
+            assert row.p99_ms >= row.p50_ms > 0
         elif row.steps < row.steps_wanted:
             assert row.note.startswith(f"{row.steps} steps of {row.steps_wanted}, stopped at")
         else:
@@ -296,3 +309,22 @@ def test_flags_reach_the_benchmarks(monkeypatch):
     assert bench.run(parser.parse_args(["--quick", "--rows", "eq4"])) == 1
     assert seen["command"][2:] == ["benchmarks", "--quick", "--rows", "eq4"]
     assert seen["env"]["OMP_NUM_THREADS"] == "1"
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_trackers_bring_the_tip_to_the_same_points(case):
+    path = track_path(case, 60)[:4]
+    assert np.linalg.norm(np.diff(path, axis=0), axis=1).min() > 1e-4
+    for solver in SOLVERS[: 3 if case == "two_cables" else 1]:
+        follow = follower(solver, track_finger(case))
+        for point in path:
+            tip, count = follow(point)
+            assert tip == pytest.approx(point, abs=2e-7) and count < 100
+
+
+def test_a_tracked_row_tells_points_a_second():
+    row = next(t for t in tracks(quick=True) if t.solver == "ccr_ros").row()
+    measure_track(row, quick=True)
+    assert (row.steps, row.converged, row.samples) == (24, 24, 24)
+    assert row.p50_ms > 0 and row.cpu_ms > 0 and 1 <= row.iterations <= 3
+    assert "points a second" in row.note and row.id == "pulls/two_cables/n9/ccr_ros"
