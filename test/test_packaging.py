@@ -104,7 +104,9 @@ def test_every_interface_file_is_built():
 
 def test_entry_points_lead_to_functions():
     scripts = distribution("ccr_ros").entry_points.select(group="console_scripts")
-    assert {"ccr", "solver_node", "servo_bridge_node"} <= set(scripts.names)
+    assert {"ccr", "solver_node", "servo_bridge_node", "gripper_coordinator_node"} <= set(
+        scripts.names
+    )
     for script in scripts:
         assert callable(script.load()), script
 

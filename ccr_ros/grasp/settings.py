@@ -56,7 +56,7 @@ class GraspSettings:
         0.02, 1e-6, 1e3, "N", "Force at which fingers that touch first wait for the others."
     )
     effort_margin: float = _setting(
-        0.05,
+        0.1,
         0.0,
         1e3,
         "N",

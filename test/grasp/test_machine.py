@@ -2,6 +2,8 @@
 """The gripper's states and events: every pair of them, and what no sequence of events may do."""
 
 import itertools
+import re
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -9,6 +11,7 @@ from hypothesis import strategies as st
 
 from ccr_ros.grasp.machine import TRANSITIONS, Event, GripperMachine, NotAllowed, State
 
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "grasping.md"
 LEADS = {(source, event): target for event, sources, target in TRANSITIONS for source in sources}
 
 # A way to every state, by events alone.
@@ -87,3 +90,21 @@ def test_the_states_are_those_of_the_message():
 def test_fault_is_left_by_reset_only():
     for event, state in itertools.product(Event, [State.FAULT]):
         assert machine_in(state).may(event) == (event is Event.RESET)
+
+
+def test_the_diagram_of_the_states_is_the_table():
+    text = PAGE.read_text(encoding="utf-8")
+    drawn = set(re.findall(r"^    (\w+) --> (\w+): (\w+)$", text, re.M))
+    # Said below it, and not drawn: what is possible in every state but fault.
+    everywhere = {Event.RELEASE, Event.STOP, Event.FAIL}
+    again = (State.CLOSING, Event.CLOSE)
+    assert {(source, target, event) for source, target, event in drawn} == {
+        (str(source), str(target), str(event))
+        for (source, event), target in LEADS.items()
+        if (event not in everywhere or (source, event) == (State.HOLDING, Event.RELEASE))
+        and (source, event) != again
+    }
+    for event in everywhere:
+        sources = {source for source, e in LEADS if e is event}
+        assert set(State) - sources <= {State.FAULT, State.RELEASING}
+    assert set(re.findall(r"^\| `(\w+)` \| ", text, re.M)) == set(map(str, State))

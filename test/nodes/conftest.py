@@ -15,6 +15,7 @@ from rclpy.context import Context
 from rclpy.parameter import Parameter
 from servo_probe import ServoProbe
 
+from ccr_ros.nodes.gripper_coordinator_node import GripperCoordinatorNode
 from ccr_ros.nodes.servo_bridge_node import ServoBridgeNode
 from ccr_ros.nodes.solver_node import SolverNode
 from ccr_ros.resources import config_dir
@@ -43,6 +44,18 @@ def start(context: Context, probe: Probe) -> Callable[..., SolverNode]:
         overrides = [Parameter(name, value=value) for name, value in values.items()]
         node = SolverNode(context=context, namespace=namespace, parameter_overrides=overrides)
         return probe.add(node)
+
+    return start
+
+
+@pytest.fixture
+def start_coordinator(context: Context, probe: Probe) -> Callable[..., GripperCoordinatorNode]:
+    """Return a function that starts a coordinator beside the probe; ``__`` in names is a dot."""
+
+    def start(namespace: str = "gripper", **values: Any) -> GripperCoordinatorNode:
+        overrides = [Parameter(n.replace("__", "."), value=v) for n, v in values.items()]
+        options = {"context": context, "namespace": namespace}
+        return probe.add(GripperCoordinatorNode(**options, parameter_overrides=overrides))
 
     return start
 

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """docs/interfaces.md says what the running nodes do."""
 
+from array import array
 from pathlib import Path
 
 import pytest
+from rclpy.action import get_action_server_names_and_types_by_node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, ReliabilityPolicy
 
@@ -13,11 +15,13 @@ NOT_OURS = ("/rosout", "/parameter_events", "/gripper/servo_bridge_node/transiti
 MANAGED = ("change_state", "get_state", "get_available_states", "get_available_transitions")
 MANAGED = {f"/gripper/servo_bridge_node/{name}" for name in (*MANAGED, "get_transition_graph")}
 CABLES = {"thumb": ("straight", "helical"), "index": ("main",)}
+SPHERE = {f"finger_{i}": ("main",) for i in (1, 2, 3)}  # the coordinator's fingers here
 TYPES = {
     Parameter.Type.STRING: "string",
     Parameter.Type.INTEGER: "integer",
     Parameter.Type.DOUBLE: "double",
     Parameter.Type.BOOL: "bool",
+    Parameter.Type.DOUBLE_ARRAY: "double array",
 }
 
 
@@ -54,6 +58,7 @@ NODES = {
         "small_rack",
         {"gripper_file", "servo_file", "calibration_file", "loopback.spring"},
     ),
+    "gripper_coordinator_node": ("start_coordinator", "no_values", set()),
 }
 
 
@@ -63,9 +68,18 @@ def node(request):
     values = request.getfixturevalue(files)
     if isinstance(values, str):
         values = {"gripper_file": values}
-    else:
+    elif values:
         values = {**values, "loopback__spring": 400.0}
     return request.getfixturevalue(start)(**values)
+
+
+@pytest.fixture
+def no_values():
+    return {}
+
+
+def fingers_of(node):
+    return SPHERE if node == "gripper_coordinator_node" else CABLES
 
 
 def qos_text(qos):
@@ -85,7 +99,7 @@ def documented(node, direction):
         if row["direction"] != direction:
             continue
         name = row["topic"] if row["topic"].startswith("/") else f"/gripper/{row['topic']}"
-        for finger, cables in CABLES.items():
+        for finger, cables in fingers_of(node).items():
             for cable in cables:
                 full = name.replace("<finger>", finger).replace("<cable>", cable)
                 yield full, (row["type"], row["QoS"])
@@ -109,7 +123,7 @@ def services(node):
 def test_services(node, probe):
     name = node.get_name()
     documented = {
-        row["service"].replace("~", f"/gripper/{name}"): row["type"]
+        f"/gripper/{row['service']}".replace("~", name): row["type"]
         for row in table(name, "service")
     }
     of_every_node = {
@@ -127,11 +141,17 @@ def parameter_names(node):
 def default_text(value):
     if isinstance(value, bool):
         return str(value).lower()
+    if isinstance(value, array):
+        return str([round(number, 9) for number in value])
     return str(value) or "empty"
 
 
 def test_parameters(node, probe):
-    rows = {row["parameter"]: row for row in table(node.get_name(), "parameter")}
+    rows = {
+        row["parameter"].replace("<finger>", finger): row
+        for row in table(node.get_name(), "parameter")
+        for finger in fingers_of(node.get_name())
+    }
     set_here = NODES[node.get_name()][2]
     assert parameter_names(node) - parameter_names(probe.node) == set(rows)
     for name, row in rows.items():
@@ -152,3 +172,18 @@ def test_joint_states_are_read_where_ros2_control_tells_them(start_bridge, small
     assert qos_text(heard.qos_profile) in " ".join(section("servo_bridge_node"))
     assert topic not in {p.topic_name for p in node.publishers}
     assert "/gripper/thumb/state" not in {s.topic_name for s in node.subscriptions}
+
+
+def test_actions(start_coordinator, probe):
+    node = start_coordinator()
+    documented = {
+        f"/gripper/{row['action']}": [row["type"]] for row in table(node.get_name(), "action")
+    }
+    found = probe.until(
+        lambda: dict(
+            get_action_server_names_and_types_by_node(probe.node, node.get_name(), "/gripper")
+        ),
+        "the actions on the graph",
+    )
+    optional = documented.pop("/gripper/gripper_cmd")
+    assert found in (documented, {**documented, "/gripper/gripper_cmd": optional})
