@@ -19,92 +19,25 @@ import numpy as np
 
 from ..model import checks
 from ..model.errors import InvalidValue
-from ..model.finger import Cable, Finger
-from ..model.solution import Solution
-from ..model.solver import FingerSolver
+from ..model.finger import Finger
 from .pull import Pull
 from .routing_chain import Target
 from .routing_free import Fit, fitted
-from .routing_search import Found, RoutingSearch
+from .routing_result import RoutingCandidate, RoutingDesign, verified
+from .routing_search import RoutingSearch
 from .segments import SegmentModel
 from .target import DesiredShape
 
 MAX_CABLES = 2
 TOLERANCE = 1e-4  # m, of a disk
-_WIDTH = {1: 128, 2: 64}
+_WIDTH = 128
+_MOST_HOLES = {1: 120, 2: 24}  # with which the search takes seconds, not minutes
 _FREE_STARTS = 8
-_FREE_HOLES = 12  # at least, where the search for free angles begins
-_FREE_EXACT = 1e-9  # m, RMS of a disk: no other start is tried
+_FREE_HOLES = 12  # among which the search for free angles begins
+_FREE_EXACT = 1e-10  # m, RMS of a disk: no other start is tried
+_CORRECTIONS = 8
 _SAME_ANGLE = 1e-6  # rad
 _LEAST_SPAN, _LARGEST_SPAN = 0.5, 1.1  # of a segment's length, between neighbouring centres
-
-
-@dataclass(frozen=True, eq=False)
-class RoutingCandidate:
-    """A routing and the pose it gives.
-
-    Attributes:
-        solution: Of `FingerSolver`, from rest; its finger has the routing.
-        holes: One tuple per cable, a hole from 1 for each disk from the base; ``None`` for free
-            angles.
-        errors: (n+1,) distances of the disks from the wanted ones [m].
-        turn: Largest angle of a disk's frame from the wanted one [rad]; ``None`` where the wanted
-            frames are not known.
-        cost: Sum of the squared errors [m^2]; of frames by the way of a segment's length.
-    """
-
-    solution: Solution
-    holes: tuple[tuple[int, ...], ...] | None
-    errors: np.ndarray
-    turn: float | None
-    cost: float
-
-    @property
-    def finger(self) -> Finger:
-        """The finger with this routing."""
-        return self.solution.finger
-
-    @property
-    def max_error(self) -> float:
-        """Largest distance of a disk from the wanted one [m]."""
-        return float(self.errors.max())
-
-    @property
-    def rms_error(self) -> float:
-        """Root of the mean squared distance of the disks from the wanted ones [m]."""
-        return float(np.sqrt(np.mean(self.errors**2)))
-
-
-@dataclass(frozen=True, eq=False)
-class RoutingDesign:
-    """The best routings found, nearest to the wanted shape first.
-
-    Attributes:
-        shape: The wanted one.
-        candidates: At least one; each converged.
-        tolerance: Largest error of a disk [m] with which a shape counts as reached.
-        note: What to know of the answer, in one line; may be empty.
-    """
-
-    shape: DesiredShape
-    candidates: tuple[RoutingCandidate, ...]
-    tolerance: float
-    note: str = ""
-
-    @property
-    def best(self) -> RoutingCandidate:
-        """The nearest."""
-        return self.candidates[0]
-
-    @property
-    def reached(self) -> bool:
-        """Whether the best routing brings every disk within the tolerance."""
-        return self.best.max_error <= self.tolerance
-
-    @property
-    def alike(self) -> int:
-        """Number of candidates whose disks all lie within the tolerance."""
-        return sum(c.max_error <= self.tolerance for c in self.candidates)
 
 
 def design_routing(
@@ -113,6 +46,7 @@ def design_routing(
     pulls: Sequence[Pull],
     *,
     free: bool = False,
+    largest_change: int | None = None,
     candidates: int = 5,
     tolerance: float = TOLERANCE,
 ) -> RoutingDesign:
@@ -125,36 +59,40 @@ def design_routing(
         shape: The wanted one; frames, or tangents, are used where it has them.
         pulls: One for each cable wanted, one or two.
         free: Holes anywhere on the circle, not at `Finger.holes_per_disk` places of it.
+        largest_change: Of a cable's hole from a disk to the next, in holes; ``None``: any. The
+            less a cable winds, the less it rubs.
         candidates: How many routings to give at most.
         tolerance: Largest error of a disk [m] with which the shape counts as reached.
 
     Raises:
-        InvalidValue: The shape does not fit the finger, the finger has obstacles, a pull is out of
-            range, or is so large that no routing found has an equilibrium.
+        InvalidValue: The shape does not fit the finger, the finger has obstacles, an option is out
+            of range, or the pulls are so large that no routing found has an equilibrium.
     """
     checks.integer("candidates", candidates, low=1, high=20)
     checks.real("tolerance", tolerance, above=0, unit="m")
+    if largest_change is not None:
+        if free:
+            raise InvalidValue("largest_change", largest_change, "left out where angles are free")
+        checks.integer("largest_change", largest_change, low=0, high=finger.holes_per_disk)
     pulls = _checked_pulls(finger, pulls)
     _check_shape(finger, shape)
     if finger.obstacles:
         allowed = "none: a routing is designed for a finger in free space"
         raise InvalidValue("obstacles", [o.name for o in finger.obstacles], allowed)
-    target = _target(finger, shape, pulls)
-    if not (target.fractions + target.pulls).any():
+    if not any(p.value for p in pulls):
         straight = ((1,) * (finger.segments + 1),) * len(pulls)
-        one = _verified(finger, shape, pulls, _hole_angles(finger, straight), straight)
+        rest = verified(finger, shape, pulls, np.zeros(np.shape(straight)), straight)
         note = "nothing is pulled: every routing leaves the finger in its rest shape"
-        return RoutingDesign(shape, tuple(c for c in [one] if c), tolerance, note)
-    model = SegmentModel(finger)
-    count = max(finger.holes_per_disk, _FREE_HOLES) if free else finger.holes_per_disk
+        return RoutingDesign(shape, tuple(c for c in [rest] if c), tolerance, note)
+    count = _FREE_HOLES if free else finger.holes_per_disk
+    if count > _MOST_HOLES[len(pulls)]:
+        allowed = f"1..{_MOST_HOLES[len(pulls)]} to choose among; or let the angles be free"
+        raise InvalidValue("holes_per_disk", count, allowed)
     holes = 2 * math.pi * np.arange(count) / count
-    search = RoutingSearch(model, holes, target, _WIDTH[len(pulls)])
-    found = search.run()
-    made = (
-        _free(finger, shape, pulls, search, found, candidates)
-        if free
-        else _snapped(finger, shape, pulls, search, found, candidates)
-    )
+    target = _target(finger, shape, pulls)
+    search = RoutingSearch(SegmentModel(finger), holes, target, _WIDTH, largest_change)
+    task = _Task(finger, shape, pulls, search)
+    made = _free(task, candidates) if free else _snapped(task, candidates)
     if not made:
         raise InvalidValue(
             "pulls",
@@ -165,25 +103,33 @@ def design_routing(
     return RoutingDesign(shape, tuple(made), tolerance)
 
 
-def _snapped(
-    finger: Finger,
-    shape: DesiredShape,
-    pulls: Sequence[Pull],
-    search: RoutingSearch,
-    found: list[Found],
-    count: int,
-) -> list[RoutingCandidate]:
+@dataclass(frozen=True, eq=False)
+class _Task:
+    finger: Finger
+    shape: DesiredShape
+    pulls: tuple[Pull, ...]
+    search: RoutingSearch
+
+    def verified(
+        self, angles: np.ndarray, holes: tuple[tuple[int, ...], ...] | None
+    ) -> RoutingCandidate | None:
+        """Solve the finger with hole angles (C, n+1); see `routing_result.verified`."""
+        return verified(self.finger, self.shape, self.pulls, angles, holes)
+
+
+def _snapped(task: _Task, count: int) -> list[RoutingCandidate]:
+    search = task.search
     made: list[RoutingCandidate] = []
     seen = set()
-    for one in found:
+    for one in search.run():
         choices = search.choices[list(one.states)]  # (n+1, C)
         holes = tuple(tuple(int(h) + 1 for h in cable) for cable in choices.T)
         # Cables that are pulled alike may change places.
-        key = tuple(sorted(holes)) if len(set(pulls)) == 1 else holes
+        key = tuple(sorted(holes)) if len(set(task.pulls)) == 1 else holes
         if key in seen or not math.isfinite(one.cost):
             continue
         seen.add(key)
-        candidate = _verified(finger, shape, pulls, _hole_angles(finger, holes), holes)
+        candidate = task.verified(search.holes[choices].T, holes)
         if candidate:
             made.append(candidate)
         if len(made) == count:
@@ -191,16 +137,12 @@ def _snapped(
     return made
 
 
-def _free(
-    finger: Finger,
-    shape: DesiredShape,
-    pulls: Sequence[Pull],
-    search: RoutingSearch,
-    found: list[Found],
-    count: int,
-) -> list[RoutingCandidate]:
+def _free(task: _Task, count: int) -> list[RoutingCandidate]:
+    search, length = task.search, task.finger.length
     fits: list[Fit] = []
-    for one in found[:_FREE_STARTS]:
+    for one in search.run()[:_FREE_STARTS]:
+        if not math.isfinite(one.cost):
+            break
         start = search.holes[search.choices[list(one.states)]]
         fit = fitted(search.model, search.target, start, one.tensions)
         if fit is None:
@@ -208,54 +150,36 @@ def _free(
         turned = np.exp(1j * fit.angles)
         if not any(np.abs(turned - np.exp(1j * f.angles)).max() < _SAME_ANGLE for f in fits):
             fits.append(fit)
-        if math.sqrt(fit.cost / len(shape.points)) * finger.length < _FREE_EXACT:
+        if math.sqrt(fit.cost / len(fit.points)) * length < _FREE_EXACT:
             break
     fits.sort(key=lambda f: f.cost)
-    made = [
-        _verified(finger, shape, pulls, np.mod(fit.angles.T, 2 * math.pi), None)
-        for fit in fits[:count]
-    ]
+    made = [_corrected(task, fit) for fit in fits[:count]]
     return [c for c in made if c]
 
 
-def _verified(
-    finger: Finger,
-    shape: DesiredShape,
-    pulls: Sequence[Pull],
-    angles: np.ndarray,
-    holes: tuple[tuple[int, ...], ...] | None,
-) -> RoutingCandidate | None:
-    """Solve the finger with hole angles (C, n+1), from rest; None if it has no equilibrium."""
-    names = _cable_names(finger, len(pulls))
-    cables = tuple(Cable(name, a) for name, a in zip(names, angles, strict=True))
-    solver = FingerSolver(replace(finger, cables=cables))
-    metres = [
-        p.value * rest if p.relative else p.value
-        for p, rest in zip(pulls, solver.rest_lengths, strict=True)
-    ]
-    if any(m >= rest for m, rest in zip(metres, solver.rest_lengths, strict=True)):
-        return None
-    solution = solver.solve(metres)
-    if not solution.certificate.converged:
-        return None
-    errors = shape.errors(solution.backbone)
-    cost, turn = float(errors @ errors), None
-    if shape.frames is not None:
-        cosine = (np.einsum("kij,kij->k", solution.frames, shape.frames) - 1.0) / 2.0
-        turns = np.arccos(np.clip(cosine, -1.0, 1.0))
-        turn = float(turns.max())
-        cost += float(turns @ turns) * finger.segment_length**2
-    return RoutingCandidate(solution, holes, errors, turn, cost)
+def _corrected(task: _Task, fit: Fit) -> RoutingCandidate | None:
+    """Return the forward model's pose for a fit, fitted anew for what the two differ by.
 
-
-def _hole_angles(finger: Finger, holes: Sequence[Sequence[int]]) -> np.ndarray:
-    return 2 * math.pi * (np.array(holes) - 1) / finger.holes_per_disk
-
-
-def _cable_names(finger: Finger, count: int) -> tuple[str, ...]:
-    if len(finger.cables) == count:
-        return finger.cable_names
-    return ("main",) if count == 1 else ("first", "second")
+    They differ where the rest curvature is linear along several pieces of a segment, which
+    `SegmentModel` has as one.
+    """
+    best = task.verified(np.mod(fit.angles.T, 2 * math.pi), None)
+    target, length = task.search.target, task.finger.length
+    for _ in range(_CORRECTIONS if task.finger.rest_pieces > 1 else 0):
+        if best is None or best.rms_error < _FREE_EXACT:
+            break
+        pose = best.solution
+        frames = target.frames
+        if frames is not None:
+            frames = fit.frames @ pose.frames.transpose(0, 2, 1) @ frames
+        points = target.points + fit.points - pose.backbone / length
+        nearer = replace(target, points=points, frames=frames)
+        again = fitted(task.search.model, nearer, fit.angles, fit.tensions)
+        found = again and task.verified(np.mod(again.angles.T, 2 * math.pi), None)
+        if again is None or not found or found.cost >= best.cost:
+            break
+        fit, best = again, found
+    return best
 
 
 def _target(finger: Finger, shape: DesiredShape, pulls: Sequence[Pull]) -> Target:

@@ -68,10 +68,19 @@ def balanced(
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """Hole angles (n+1, C) [rad], tensions (C,) and the sum of squared errors, units of L^2."""
+    """What hole angles give.
+
+    Attributes:
+        angles: (n+1, C) [rad].
+        tensions: (C,) T L^2 / EI.
+        frames, points: (n+1, 3, 3) and (n+1, 3) of the disks, units of L.
+        cost: Sum of squared errors, units of L^2.
+    """
 
     angles: np.ndarray
     tensions: np.ndarray
+    frames: np.ndarray
+    points: np.ndarray
     cost: float
 
 
@@ -108,7 +117,7 @@ def fitted(
         damping *= 10.0
         if damping > 1e6:
             break
-    return Fit(here.angles, here.tensions, cost)
+    return Fit(here.angles, here.tensions, *here.at.poses(), cost)
 
 
 def _linearized(
@@ -116,17 +125,16 @@ def _linearized(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Errors (m,) of disks from the target, and their Jacobian (m, (n+1) C) in the hole angles."""
     at, turned = here.at, _turned(model, target, here)
-    rotation, position = np.eye(3), np.zeros(3)
+    frames, points = at.poses()
     columns = turned.shape[2]
-    turn, drift = np.zeros((3, columns)), np.zeros((3, columns))
+    turn, drift = np.zeros((columns, 3)), np.zeros((columns, 3))
     errors, rows = [], []
     for i in range(len(at.z)):
-        step = rotation @ at.translation[i]
-        drift = drift + cross(turn.T, step).T + rotation @ turned[i, 3:]
-        turn = turn + rotation @ turned[i, :3]
-        position, rotation = position + step, rotation @ at.rotation[i]
-        errors.append(target.errors(i + 1, rotation[None], position[None])[0])
-        rows.append(target.slopes(i + 1, rotation[None], turn.T[None], drift.T[None])[0].T)
+        disk, before, frame = i + 1, frames[i].T, frames[i + 1][None]
+        drift = drift + cross(turn, points[disk] - points[i]) + turned[i, 3:].T @ before
+        turn = turn + turned[i, :3].T @ before
+        errors.append(target.errors(disk, frame, points[disk][None])[0])
+        rows.append(target.slopes(disk, frame, turn[None], drift[None])[0].T)
     return np.concatenate(errors), np.concatenate(rows)
 
 

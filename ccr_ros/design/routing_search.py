@@ -20,10 +20,11 @@ from .routing_table import SegmentTable
 from .routing_tensions import likely_tensions
 from .segments import SegmentModel
 
-_SPREAD = {1: 0.12, 2: 0.2}  # of the tensions about those tried, relative
+_SPREAD = {1: 0.12, 2: 0.4}  # of the tensions about those tried, relative
 _SETTLED = 0.03  # tensions that change by less are not tried again, relative
 _NOISE = 1e-3  # of positions, units of L, against which the spread is held
 _GOOD = 1e-4  # RMS error of a disk, units of L, at which no further tensions are tried
+_SMALL = 2  # changes of hole that are tried first where there are two cables
 _MARGIN = 2  # times as many as are kept are laid exactly
 _KEPT = 24  # routings that go from one stage to the next
 _ROUNDS = 30  # of exchanges
@@ -42,32 +43,62 @@ class Found:
 class RoutingSearch:
     """Searches routings of C cables through H holes on every disk.
 
-    Attributes:
-        holes: (H,) hole angles [rad].
+    Args:
+        model: The finger's segments.
+        holes: (H,) hole angles [rad], evenly spaced.
+        target: Wanted disks and pulls.
+        width: Number of routings that are kept at a disk.
+        most: Largest change of hole from a disk to the next; ``None``: any.
     """
 
-    def __init__(self, model: SegmentModel, holes: np.ndarray, target: Target, width: int) -> None:
+    def __init__(
+        self,
+        model: SegmentModel,
+        holes: np.ndarray,
+        target: Target,
+        width: int,
+        most: int | None = None,
+    ) -> None:
         self.model = model
         self.holes = holes
         self.target = target
         self.width = width
         self.cables = len(target.pulls)
         self.forecast = Forecast(model, holes, target)
+        self.most = most
         self.choices = np.array(list(product(range(len(holes)), repeat=self.cables)))  # (S, C)
+        self._limit(most)
 
     def run(self) -> list[Found]:
         """Return the best routings found, nearest to the wanted shape first, each once."""
         kept: list[Found] = []
+        # Of two cables so many routings come near that the search may miss the one that gives the
+        # shape; one with small changes is likelier meant, rubs less, and is among fewer.
+        for most in [_SMALL, self.most] if self.cables > 1 and self.most is None else [self.most]:
+            self._limit(most)
+            small = most is not None and most <= _SMALL
+            kept = self._merged(kept, self._searched(small))
+            if self._rms(kept) < _GOOD:
+                break
+        return self._exchanged(kept)
+
+    def _limit(self, most: int | None) -> None:
+        """Allow changes of hole up to ``most`` from a disk to the next."""
+        count = len(self.holes)
+        most = count if most is None else most
+        change = np.abs(self.choices[:, None] - self.choices)
+        self._allowed = (np.minimum(change, count - change) <= most).all(axis=2)
+
+    def _searched(self, small: bool) -> list[Found]:
+        kept: list[Found] = []
         heads: list[Found] = []
-        for tensions in likely_tensions(self.model, self.target):
+        for tensions in likely_tensions(self.model, self.target, small):
             found = self._beam(self._table(tensions), _SPREAD[self.cables])
             heads.append(found[0])
             kept = self._merged(kept, found)
             if self._rms(kept) < _GOOD:
-                break
-        else:
-            kept = self._again(kept, heads)
-        return self._exchanged(kept)
+                return kept
+        return self._again(kept, heads)
 
     def _again(self, kept: list[Found], heads: list[Found]) -> list[Found]:
         """Search at the tensions of the best routings found, and at those that come of it."""
@@ -111,8 +142,12 @@ class RoutingSearch:
         chain = Chain.at_base(np.arange(len(self.choices)), self.cables)
         for _ in range(len(self.target.points) - 1):
             holes = self.choices[chain.states[:, -1]]
-            likely = self.forecast.costs(chain, holes, table.tensions, prior).ravel()
+            likely = self.forecast.costs(chain, holes, table.tensions, prior)
+            likely = likely.reshape(self._allowed[chain.states[:, -1]].shape)
+            likely[~self._allowed[chain.states[:, -1]]] = np.inf
+            likely = likely.ravel()
             best = _lowest(likely, _MARGIN * self.width)
+            best = best[np.isfinite(likely[best])]
             rows, states = np.divmod(best, len(self.choices))
             chain = extended(chain, rows, states, table, self.target)
             chain = chain.only(_lowest(chain.costs(prior), self.width))
@@ -156,7 +191,8 @@ class RoutingSearch:
                 some = holes.copy()
                 some[disk:] = (some[disk:] + turn) % count
                 new.append((some @ place)[None])
-        return np.unique(np.concatenate(new), axis=0)
+        routings = np.unique(np.concatenate(new), axis=0)
+        return routings[self._allowed[routings[:, :-1], routings[:, 1:]].all(axis=1)]
 
 
 def _lowest(costs: np.ndarray, count: int) -> np.ndarray:

@@ -74,7 +74,7 @@ class SegmentTable:
         start, end = (self._angles[s] for s in np.divmod(pair, self._states))
         rest = self._kinds[kind]
         model, count = self._model, len(keys)
-        at, hessian, _ = model.solve(
+        at, hessian, good = model.solve(
             rest, start, end, np.broadcast_to(self.tensions, start.shape), tolerance=_TOLERANCE
         )
         slack = model.evaluate(rest, start, end).lengths
@@ -83,5 +83,6 @@ class SegmentTable:
         twists = (at.twists @ change).transpose(0, 2, 1)
         flat = [at.rotation, at.translation, twists[:, :, :3], twists[:, :, 3:], at.lengths, slack]
         rows = np.concatenate([a.reshape(count, -1) for a in (*flat, stretch)], axis=1)
+        rows[~good] = np.nan  # no routing with this segment is among the nearest
         self._row.update((key, len(self._rows) + i) for i, key in enumerate(keys.tolist()))
         self._rows = np.concatenate([self._rows, rows])

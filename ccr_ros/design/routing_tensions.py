@@ -18,16 +18,23 @@ from .segments import SegmentModel
 # A cable through parallel holes has T = pull / a^2 (EI = L = 1); crossing ones bend a rod less,
 # those of two cables share the work or work against each other. Measured on random routings: 0.99
 # to 3.1 for one cable, 0.06 to 5.5 for two.
-_STEPS = {1: np.geomspace(1.03, 2.9, 6), 2: np.geomspace(0.25, 5.0, 10)}
+_STEPS = {1: np.geomspace(1.03, 2.9, 6), 2: np.geomspace(0.25, 5.0, 14)}
 _TRIED = {1: 6, 2: 28}
-_SHOWN = 0.75  # of the energy is bending that disk centres show (measured: 0.38 to 0.9)
+_SHOWN = 0.65  # of the energy is bending that disk centres show (measured: 0.38 to 0.87)
+_SHOWN_BY_SMALL = 0.85  # where holes change by at most two from disk to disk (0.78 to 0.9)
 
 
-def likely_tensions(model: SegmentModel, target: Target) -> list[np.ndarray]:
-    """Return tensions (C,), T L^2 / EI, in the order in which they should be tried."""
+def likely_tensions(model: SegmentModel, target: Target, small: bool) -> list[np.ndarray]:
+    """Return tensions (C,), T L^2 / EI, in the order in which they should be tried.
+
+    Args:
+        small: Holes change by no more than one or two from a disk to the next.
+    """
     pulls = target.fractions + target.pulls  # of a rest length of about one
     cables = len(pulls)
-    energy = bending_energy(target.points, model.rest_points()) / _SHOWN
+    energy = bending_energy(target.points, model.rest_points()) / (
+        _SHOWN_BY_SMALL if small else _SHOWN
+    )
     tried = [
         pulls / model.radius**2 * np.array(step) for step in product(_STEPS[cables], repeat=cables)
     ]

@@ -82,6 +82,14 @@ class Segments:
     holes: np.ndarray
     gradient: np.ndarray
 
+    def poses(self) -> tuple[np.ndarray, np.ndarray]:
+        """Frames (k+1, 3, 3) and centres (k+1, 3) of the disks, the segments being one chain."""
+        frames, points = [np.eye(3)], [np.zeros(3)]
+        for turn, shift in zip(self.rotation, self.translation, strict=True):
+            points.append(points[-1] + frames[-1] @ shift)
+            frames.append(frames[-1] @ turn)
+        return np.array(frames), np.array(points)
+
 
 class SegmentModel:
     """Evaluates and solves segments of one finger: one arc each, as the default settings have.
@@ -118,12 +126,7 @@ class SegmentModel:
     def rest_points(self) -> np.ndarray:
         """Disk centres (n+1, 3) at rest."""
         none = np.zeros((len(self.rest), 0))
-        at = self.evaluate(self.rest, none, none)
-        rotation, points = np.eye(3), [np.zeros(3)]
-        for turn, shift in zip(at.rotation, at.translation, strict=True):
-            points.append(points[-1] + rotation @ shift)
-            rotation = rotation @ turn
-        return np.array(points)
+        return self.evaluate(self.rest, none, none).poses()[1]
 
     def hessian(self, at: Segments, tensions: np.ndarray) -> np.ndarray:
         """Second derivatives (k, s, s) in y of the energy and of tensions (k, C) times lengths."""
@@ -190,6 +193,8 @@ class SegmentModel:
             good = np.abs(unbalanced).max(axis=1) < tolerance
             if good.all():
                 break
+            lost = ~np.isfinite(hessian).all(axis=(1, 2))  # under tensions beyond reason
+            hessian[lost], unbalanced[lost] = np.eye(self.size), np.nan
             step = self.scale * np.linalg.solve(hessian, unbalanced[:, :, None])[:, :, 0]
             longest = np.abs(step).max(axis=1, keepdims=True)
             step *= np.minimum(1.0, _LONGEST_STEP / np.maximum(longest, 1e-300))

@@ -23,15 +23,10 @@ import numpy as np
 from ccr_ros.cli.design.curve_arguments import add_shape_arguments, wanted_from_args
 from ccr_ros.cli.options import integer, number
 from ccr_ros.cli.solve import parse_pull
-from ccr_ros.design.routing import (
-    MAX_CABLES,
-    TOLERANCE,
-    Pull,
-    RoutingCandidate,
-    RoutingDesign,
-    design_routing,
-)
-from ccr_ros.model import FingerSolver, InvalidValue
+from ccr_ros.design.pull import Pull
+from ccr_ros.design.routing import MAX_CABLES, TOLERANCE, design_routing
+from ccr_ros.design.routing_result import RoutingCandidate, RoutingDesign
+from ccr_ros.model import Finger, FingerSolver, InvalidValue
 from ccr_ros.model.files import load_finger
 from ccr_ros.model.finger_text import write_finger
 from ccr_ros.resources import find_config
@@ -53,6 +48,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--cables", metavar="K", help=f"number of cables, 1 to {MAX_CABLES} (default: of pulls)"
     )
     parser.add_argument("--free", action="store_true", help="holes at any angle, not the finger's")
+    parser.add_argument(
+        "--largest-change", metavar="K", help="of a hole from a disk to the next (default: any)"
+    )
     parser.add_argument(
         "--no-frames", action="store_true", help="use the disk centres alone of --shape FILE.json"
     )
@@ -81,6 +79,7 @@ def run(args: argparse.Namespace) -> int:
         shape,
         _pulls(args),
         free=args.free,
+        largest_change=None if args.largest_change is None else _change(args, finger),
         candidates=integer("--candidates", args.candidates, 1, 20),
         tolerance=number("--tolerance", args.tolerance, 1e-9, 1e3) / 1e3,
     )
@@ -100,6 +99,10 @@ def run(args: argparse.Namespace) -> int:
             if path:
                 print(f"{word} {path}")
     return 0 if design.reached else 1
+
+
+def _change(args: argparse.Namespace, finger: Finger) -> int:
+    return integer("--largest-change", args.largest_change, 0, finger.holes_per_disk)
 
 
 def _pulls(args: argparse.Namespace) -> list[Pull]:
