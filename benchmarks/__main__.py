@@ -40,7 +40,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(table(rows))
         print(f"\n{len(rows)} rows in {seconds:.0f} s; {_machine()}")
     # Not the group "cable-model": with given spans a finger may have no pose clear of an obstacle.
-    groups = ("sweep", "pulls")
+    groups = ("sweep", "pulls", "rest-shape")
     ours = (r for r in rows if r.group == "discretisation" or (r.group in groups and r.name == OWN))
     return int(any(row.converged < row.samples for row in ours))
 

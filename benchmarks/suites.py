@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 
 from ccr_ros.model import SolverSettings
 
@@ -12,6 +13,7 @@ from .baselines import BASELINES
 from .cartesian import LITERAL, CartesianProblem, Formulation
 from .cases import CONTACT, TABLE_I, Case, load_case
 from .measure import OWN, BaselineSweeper, OwnSweeper, Plan, Sweeper
+from .rest_shape import CURVES, EquilibriumSweeper, NestedSweeper, rest_case
 
 STRAIGHT_BACKBONE = ("straight", "helical", "general_1", "general_2")
 # Where the slow solvers are run with more disks: without contact, winding, pre-bent in contact.
@@ -29,6 +31,7 @@ GROUPS: dict[str, str] = {
     "cable-model": "Frictionless cable (total length given) or proportional spans (the paper's)",
     "discretisation": "Accuracy against arcs per segment and their order",
     "pulls": "Pulls that follow a path of the tip (200 points; 25 if quick)",
+    "rest-shape": "Rest shapes for a wanted shape (errors: of the forward model, from rest)",
     "memory": "Peak resident memory of build and five steps, above the imported libraries",
     "transport": "Messages between two processes, and a node that idles",
 }
@@ -60,6 +63,7 @@ def plans(quick: bool) -> Iterator[Plan]:
     yield from _eq4(quick, effort)
     yield from _cable_models(quick, effort)
     yield from _discretisation(quick, effort)
+    yield from _rest_shapes(quick, effort)
 
 
 def memory_plans(quick: bool) -> list[tuple[str, str, int]]:
@@ -158,3 +162,16 @@ def _discretisation(quick: bool, effort: Effort) -> Iterator[Plan]:
                     effort.steps,
                     2,
                 )
+
+
+def _rest_shapes(quick: bool, effort: Effort) -> Iterator[Plan]:
+    baseline = "scipy least_squares, nested"
+    for name in ("short",) if quick else tuple(CURVES):
+        case, shape = rest_case(name)
+        finger = case.finger
+        equilibrium = partial(EquilibriumSweeper, finger, shape)
+        yield Plan("rest-shape", OWN, case, equilibrium, baseline, effort.steps, effort.repeats)
+        for method in ("least_squares",) if quick else ("least_squares", "slsqp"):
+            nested = partial(NestedSweeper, finger, shape, method)
+            label = f"scipy {method}, nested"
+            yield Plan("rest-shape", label, case, nested, baseline, 1, cap=24 * effort.cap)

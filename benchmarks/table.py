@@ -77,6 +77,8 @@ def table(rows: Sequence[Row]) -> str:
         "iter.: median per step.\n"
         "pulls: a step is a point of the path, iter. how many poses are tried for it, and what\n"
         "the tip is off by is a root mean square over the path.\n"
+        "rest-shape: a step is one whole design, iter. its forward solves; RMS is of the forward\n"
+        "model against the wanted disks.\n"
         "transport: p50, p99 from publish to callback, or of calling a service until its answer;\n"
         "cpu of both processes for one of them, or of an idle node in a second."
     )
