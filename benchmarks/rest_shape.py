@@ -96,7 +96,7 @@ class EquilibriumSweeper(_Sweeper):
             return None
         design = self._solver.solve(self.shape, {self.cable: Pull(pull, relative=True)})
         best = design.shapes[0]
-        return best.finger, best.pulls, 1
+        return best.finger, best.pulls, 0
 
 
 class _Late(Exception):
