@@ -303,7 +303,8 @@ class ServoBridge:
 
     def close(self) -> None:
         """Leave the servos as they are: they hold."""
-        self.deactivate()
+        self._end_calibration({}, "the bridge was closed")
+        self._active = False
         with suppress(BusLost):  # they keep their last setpoint by themselves
             self.driver.hold()
         self.driver.close()

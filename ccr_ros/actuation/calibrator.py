@@ -14,6 +14,9 @@ from ccr_ros.model.errors import CcrError
 
 from .axis import CableAxis
 
+_LOW = 0.2  # share of the threshold below which a tension may be noise
+_HIGH = 0.9  # share of the largest tension beyond which the servo may be turning
+
 
 class CalibrationFailed(CcrError):
     """A zero could not be found; its text says of which joint, and why."""
@@ -39,16 +42,18 @@ class CalibrationSettings:
 class _Phase(Enum):
     UNWIND = "pay out"
     WIND = "wind"
-    RETURN = "return"
+    UNLOAD = "pay out again"
+    RETURN = "go to the zero"
 
 
 class Calibrator:
     """Calibrates joints in turn.
 
     A cable is paid out until its tension falls no more (what is left is the zero of the effort),
-    then wound until the tension has risen by the threshold. A straight line through the rise,
-    carried back to where it left the zero of the effort, gives the place where the cable became
-    taut, so that neither threshold nor stiffness shift it. The servo goes back there.
+    wound until the tension has risen by the threshold, and paid out again until it has fallen.
+    Straight lines through rise and fall, carried on to the zero of the effort, give the place where
+    the cable becomes taut, so that neither threshold nor stiffness shift it; the mean of the two
+    rids it of friction and of efforts that are told late. The servo goes there.
 
     Args:
         axes: The joints to calibrate.
@@ -121,22 +126,34 @@ class Calibrator:
     def _wind(self, axis: CableAxis, by: float) -> None:
         settings = self._settings
         if axis.tension - self._ground >= settings.threshold:
-            self._home = self._taut(np.array(self._samples)) * axis.transmission.angle_per_pull
-            self._turn(axis, _Phase.RETURN)
+            self._taut_winding = self._taut(np.array(self._samples))
+            self._turn(axis, _Phase.UNLOAD)
         elif self._move(axis, by) > settings.search:
             raise CalibrationFailed(
                 f"{self.joint}: no tension after {1e3 * settings.search:g} mm were wound; is the "
                 "cable broken or off its spool?"
             )
 
+    def _unload(self, axis: CableAxis, by: float) -> None:
+        settings = self._settings
+        if axis.tension - self._ground < _LOW * settings.threshold:
+            falling = self._taut(np.array(self._samples[::-1]))
+            taut = 0.5 * (self._taut_winding + falling)
+            self._home = taut * axis.transmission.angle_per_pull
+            self._turn(axis, _Phase.RETURN)
+        elif -self._move(axis, -by) > settings.search:
+            raise CalibrationFailed(f"{self.joint}: the tension stays when cable is paid out")
+
     def _return(self, axis: CableAxis, by: float) -> None:
         per_pull = axis.transmission.angle_per_pull
         way = (self._home - axis.setpoint) / per_pull
-        axis.wind(axis.setpoint + math.copysign(min(by, abs(way)), way) * per_pull)
-        if axis.setpoint == self._home or abs(way) < 1e-9:
+        if abs(way) <= by:
+            axis.wind(self._home)
             self.zeros[self.joint] = self._home
             del self._left[0]
             self._begin()
+        else:
+            axis.wind(axis.setpoint + math.copysign(by, way) * per_pull)
 
     def _turn(self, axis: CableAxis, phase: _Phase) -> None:
         self._phase = phase
@@ -144,11 +161,19 @@ class Calibrator:
         self._start = axis.setpoint / axis.transmission.angle_per_pull
 
     def _taut(self, samples: np.ndarray) -> float:
-        """Return the wound length [m] where the tension began to rise; samples (k, 2): m, N."""
-        wound, rise = samples[:, 0], samples[:, 1] - self._ground
-        low = np.flatnonzero(rise < 0.2 * self._settings.threshold)
-        rising = slice(low[-1] + 1 if len(low) else 0, None)
-        wound, rise = wound[rising], rise[rising]
+        """Return the wound length [m] where the tension leaves its ground.
+
+        Args:
+            samples: Wound lengths and tensions (k, 2) [m], [N], from slack to taut.
+        """
+        top = int(np.argmax(samples[:, 1])) + 1  # beyond it the servo was turning
+        wound, rise = samples[:top, 0], samples[:top, 1] - self._ground
+        low = np.flatnonzero(rise < _LOW * self._settings.threshold)
+        start = low[-1] + 1 if len(low) else 0
+        used = np.arange(start, top)
+        straight = used[rise[start:] < _HIGH * rise[-1]]
+        used = straight if len(straight) > 2 else used
+        wound, rise = wound[used], rise[used]
         if len(wound) < 2 or np.ptp(wound) < 1e-9:
             return float(wound[0])
         slope, _ = np.polyfit(wound, rise, 1)

@@ -38,10 +38,11 @@ def mm_off(bench, zeros, true_zeros):
 @settings(max_examples=10)
 @given(
     st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0)),
-    st.floats(100.0, 2000.0),
+    st.floats(100.0, 1000.0),
 )
 def test_zeros_are_found_from_slack_and_from_taut(true_zeros, stiffness):
-    bench = Bench(QUICK, LoopbackSettings(spring=stiffness), true_zeros).active()
+    slow = BridgeSettings(calibration=CalibrationSettings(rate=0.01))
+    bench = Bench(slow, LoopbackSettings(spring=stiffness), true_zeros).active()
     assert not any(axis.calibrated for axis in bench.bridge.axes)
     zeros, failure = calibrated(bench)
     assert not failure
@@ -57,6 +58,21 @@ def test_zeros_are_found_from_slack_and_from_taut(true_zeros, stiffness):
 def test_noise_backlash_and_a_crooked_effort_do_not_spoil_it():
     servos = LoopbackSettings(spring=400.0, noise=0.002, effort_noise=0.0005, backlash=0.01)
     bench = Bench(BridgeSettings(), servos, (0.3, -0.4)).active()
+    zeros, failure = calibrated(bench)
+    assert not failure
+    assert max(mm_off(bench, zeros, (0.3, -0.4))) < 0.3
+
+
+def test_efforts_that_are_told_late_shift_no_zero():
+    bench = Bench(QUICK, LoopbackSettings(spring=400.0), (0.3, -0.4)).active()
+    read, late = bench.driver.read, []
+
+    def told_late(now):
+        reading = read(now)
+        late.append(reading.efforts)
+        return replace(reading, efforts=late[max(0, len(late) - 6)])  # 0.1 s, or 2 mm
+
+    bench.driver.read = told_late
     zeros, failure = calibrated(bench)
     assert not failure
     assert max(mm_off(bench, zeros, (0.3, -0.4))) < 0.3

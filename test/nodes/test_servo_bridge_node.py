@@ -221,6 +221,10 @@ def test_efforts_come_from_the_solver(servos, probe, start, start_bridge):
     solved = probe.until(lambda: probe.states("finger_3") and probe.states("finger_3")[-1])
     assert solved.pulls[0] == pytest.approx(0.004, abs=2e-4)
     assert servos.joint("finger_1_main").tension == pytest.approx(0.0, abs=0.05)
+    # And calibration finds the zero by them; how well depends on how quickly the solver answers.
+    answer = servos.calibrate("finger_2_main")
+    assert answer.success, answer.message
+    assert answer.zeros[0] == pytest.approx(0.0, abs=0.1)
 
 
 def test_tensions_that_are_not_in_newton_are_not_known(servos, probe, start_bridge):

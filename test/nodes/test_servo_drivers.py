@@ -93,8 +93,7 @@ def test_ros2_control_is_calibrated(servos, start_bridge, controller):
     assert math.isnan(servos.joint("finger_1_main").pull)
     answer = servos.calibrate()
     assert answer.success, answer.message
-    # Joint states are up to two cycles older than commands: 0.8 mm at this rate.
-    assert list(answer.zeros) == pytest.approx([1.0, 1.0, 1.0], abs=0.1)
+    assert list(answer.zeros) == pytest.approx([1.0, 1.0, 1.0], abs=0.05)
     servos.in_state(ServoState.ACTIVE)
     servos.lead_to("finger_2", 0.003)
 
