@@ -57,7 +57,7 @@ def figure_of_design(
     figure = new_figure(16.5, 6.8)
     grid = figure.add_gridspec(
         1, 4, width_ratios=(1.3, 1, 1, 0.8), left=0.01, right=0.985, top=0.84, bottom=0.145,
-        wspace=0.22,
+        wspace=0.28,
     )  # fmt: skip
     if curve is None:
         curve = _through(wanted)
@@ -95,7 +95,7 @@ def _draw_errors(axes: Any, errors: np.ndarray) -> None:
     from matplotlib.ticker import MaxNLocator
 
     shown = np.maximum(errors[1:] * MM, _SMALLEST)
-    below = f" (drawn from {_SMALLEST:g} on)" if shown.min() == _SMALLEST else ""
+    below = f"\n(less than {_SMALLEST:g} is drawn as that)" if shown.min() == _SMALLEST else ""
     disks = np.arange(1, len(errors))
     low = 10.0 ** np.floor(np.log10(shown.min()) - 0.5)
     axes.vlines(disks, low, shown, color=palette.WANTED, lw=2, alpha=0.6)
@@ -106,7 +106,7 @@ def _draw_errors(axes: Any, errors: np.ndarray) -> None:
     axes.set_xlabel("disk", fontsize=9)
     total = float(np.sum((errors * MM) ** 2))
     axes.set_title(
-        f"distance from the wanted centre [mm]{below}\nsum of squares {total:.2g} mm²",
+        f"distance from wanted centre [mm]\nsum of squares {total:.2g} mm²{below}",
         fontsize=9.5,
         color="#4a5568",
     )

@@ -98,7 +98,7 @@ def test_no_rest_shape_ends_with_1_and_writes_nothing(tmp_path, capsys):
         (["--pull=-5%"], "pulls: {'main': -0.05} is not allowed"),
         (["--pull", "thumb=3%"], "unknown cable 'thumb'"),
         (["--pull", "3%", "--pull", "main=2%"], "given once per cable"),
-        (["--pull", "3%", "--finger", "two_cables"], "'two_cables' has several cables"),
+        (["--pull", "3%", "--finger", "two_cables"], "CABLE=3%, CABLE one of straight, helical"),
         (["--pull", "3%", "--finger", "gripper_sphere"], "describes a gripper"),
         (["--pull", "3%", "--length", "0"], "--length: '0'"),
         (["--pull", "3%", "--center-height", "0.05"], "6 mm below the base plane"),

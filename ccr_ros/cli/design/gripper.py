@@ -128,7 +128,7 @@ def run(args: argparse.Namespace) -> int:
         design.gripper,
         kinds,
         output_folder(args.out),
-        f"{args.name or kind}_finger",
+        task.template.name,
         comment=f"Made by: {command}",
         finger_comments=[
             f"{summary(design.fingers[kinds.index(k)])}\nMade by: {command}"
@@ -154,12 +154,14 @@ def run(args: argparse.Namespace) -> int:
 
 def _task(args: argparse.Namespace) -> GripperTask:
     template = load_finger(find_config(args.finger))
+    body = object_from_text(args.object)
+    template = replace(template, name=f"{args.name or body.kind}_finger")
     if args.length is not None:
         template = replace(
             template, length=number("--length", args.length, 1e-3, 1e3), rest_curvature=None
         )
     layout = GripperLayout(
-        object_from_text(args.object),
+        body,
         number("--center-height", args.center_height, -1e3, 1e3),
         number("--base-radius", args.base_radius, 1e-3, 1e3),
         integer("--fingers", args.fingers, 2, MOST_FINGERS),
@@ -176,10 +178,11 @@ def _task(args: argparse.Namespace) -> GripperTask:
 
 def _pulls(words: list[str], finger: Finger) -> dict[str, Pull]:
     pulls: dict[str, Pull] = {}
+    cables = ", ".join(finger.cable_names)
     for word in words:
         cable, equals, text = word.rpartition("=")
         if not equals and len(finger.cables) > 1:
-            raise InvalidValue("--pull", word, f"CABLE={word}: {finger.name!r} has several cables")
+            raise InvalidValue("--pull", word, f"CABLE={word}, CABLE one of {cables}")
         cable = cable or finger.cable_names[0]
         if cable not in finger.cable_names:
             raise UnknownName("cable", cable, finger.cable_names)
