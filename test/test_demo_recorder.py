@@ -5,16 +5,16 @@ import time
 
 import pytest
 import rclpy
-from ccr_msgs.msg import CablePulls
 from geometry_msgs.msg import PoseArray
 from rclpy.executors import SingleThreadedExecutor
+from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
 from ccr_ros.demo.recorder import Recorder
-from ccr_ros.demo.script import GRIPPER_FILE
+from ccr_ros.demo.scene import GRIPPER_FILE
 from ccr_ros.model import FingerSolver, InvalidValue, load_gripper
 from ccr_ros.nodes.conversions import pose_array, state_message
-from ccr_ros.nodes.qos import COMMAND, LATCHED
+from ccr_ros.nodes.qos import JOINT_STATES, LATCHED
 from ccr_ros.resources import find_config
 
 
@@ -47,7 +47,6 @@ def test_no_frame_is_taken_before_the_whole_pose_of_every_finger(graph):
     """States alone are not poses: a finger's backbone may come later than its state."""
     gripper, recorder, solver, spin = graph
     header = Header(stamp=solver.get_clock().now().to_msg())
-    pulls = solver.create_publisher(CablePulls, "finger_1/cable_pulls", COMMAND)
     held_back = []
     for mounted in gripper.fingers:
         name = mounted.finger.name
@@ -66,8 +65,9 @@ def test_no_frame_is_taken_before_the_whole_pose_of_every_finger(graph):
                 held_back.append((publisher, message))
             else:
                 publisher.publish(message)
-    assert spin(lambda: recorder.complete and pulls.get_subscription_count())
-    pulls.publish(CablePulls(header=header, pulls=[0.0]))
+    assert spin(lambda: recorder.complete)
+    recorder.begin()
+    recorder.set_phase("closing")
     assert spin(lambda: recorder.elapsed is not None and recorder.elapsed > 0.3)
     with pytest.raises(InvalidValue):
         recorder.recording()
@@ -82,4 +82,39 @@ def test_no_frame_is_taken_before_the_whole_pose_of_every_finger(graph):
             return False
 
     assert spin(recorded)
-    assert all(len(frame.fingers) == 3 for frame in recorder.recording().frames)
+    recording = recorder.recording()
+    assert all(len(frame.fingers) == 3 for frame in recording.frames)
+    assert recording.phases[0][1] == "closing"
+
+
+def test_servo_angles_are_put_to_their_fingers(graph):
+    gripper, recorder, solver, spin = graph
+    header = Header(stamp=solver.get_clock().now().to_msg())
+    for mounted in gripper.fingers:
+        name, solution = mounted.finger.name, FingerSolver(mounted.finger).rest
+        for topic, message in (
+            ("backbone", pose_array(header, solution.backbone, solution.quaternions)),
+            ("cables/main", pose_array(header, solution.cables["main"], solution.quaternions)),
+            ("state", state_message(header, solution, stale=False, dropped=0)),
+        ):
+            solver.create_publisher(type(message), f"{name}/{topic}", LATCHED).publish(message)
+    joints = solver.create_publisher(JointState, "joint_states", JOINT_STATES)
+    assert spin(lambda: recorder.complete and joints.get_subscription_count())
+    recorder.begin()
+    names = ["finger_2_main", "finger_1_main", "unknown"]
+
+    def angles():
+        joints.publish(JointState(name=names, position=[0.2, 0.1, 9.0]))
+        try:
+            last = recorder.recording().frames[-1].fingers
+        except InvalidValue:
+            return None
+        return [last[n].servo_angles for n in ("finger_1", "finger_2", "finger_3")]
+
+    def known():
+        found = angles()
+        return found is not None and found[0] is not None
+
+    assert spin(known)
+    one, two, three = angles()
+    assert (list(one), list(two), three) == ([0.1], [0.2], None)

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Three fingers move on a ROS graph: the solver node and a publisher of cable pulls, as processes
-of their own, in a ROS domain of their own (unless ROS_DOMAIN_ID is set). They close on a ball and
-open again, one of them in its own rhythm. Without ROS 2 and cyclonedds, all run in one process.
+"""The paper's gripper at work: three pre-bent fingers close on a ball of 112 mm, hold it while it
+gets heavier, and let it go at a set time. All of it through the real nodes, topics, actions and
+simulated servos, as processes of their own, in a ROS domain of their own (unless ROS_DOMAIN_ID is
+set). Without ROS 2 and cyclonedds, all run in one process.
 
 It leaves, in DIR: replay.html (open it in a browser), strip.png and recording.json; and prints what
 was measured. Exit code: 0 done, 1 a node failed, 2 bad input.
@@ -19,7 +20,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     parser.add_argument("--out", metavar="DIR", default="demo", help="folder (default: demo)")
     parser.add_argument(
-        "--seconds", metavar="S", default="18", help="how long the fingers move (default: 18)"
+        "--hold", metavar="S", default="10", help="how long the ball is held (default: 10 s)"
+    )
+    parser.add_argument(
+        "--record", metavar="FILE.mcap", help="record all topics, for Foxglove and ros2 bag"
     )
     parser.add_argument(
         "--headless",
@@ -33,7 +37,7 @@ def run(args: argparse.Namespace) -> int:
     """Run the demo and return the exit code.
 
     Raises:
-        InvalidFile, InvalidValue: The folder cannot be written to, or the time is out of range.
+        InvalidFile, InvalidValue: A place cannot be written to, or the time is out of range.
     """
     # Here, so that `ccr demo --help` stays quick.
     from ccr_ros.demo.progress import Progress
@@ -42,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
 
     progress = Progress(sys.stdout)
     try:
-        paths = run_demo(Path(args.out), _number(args.seconds), progress)
+        paths = run_demo(Path(args.out), _number(args.hold), progress, args.record)
     except StackFailed as error:
         progress.clear()
         print(f"ccr: error: {error}", file=sys.stderr)
@@ -69,4 +73,4 @@ def _number(text: str) -> float:
     except ValueError:
         from ccr_ros.model import InvalidValue
 
-        raise InvalidValue("--seconds", text, "a number of seconds") from None
+        raise InvalidValue("--hold", text, "a number of seconds") from None

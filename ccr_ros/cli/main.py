@@ -22,7 +22,10 @@ from ccr_ros.blas import use_one_thread
 from ccr_ros.model.errors import CcrError
 
 COMMANDS: dict[str, tuple[str, str]] = {
-    "demo": ("ccr_ros.cli.demo", "three fingers move on a ROS graph; leaves pictures and a replay"),
+    "demo": (
+        "ccr_ros.cli.demo",
+        "three fingers grasp a ball and let it go; leaves a replay",
+    ),
     "test": ("ccr_ros.cli.test", "run the linters, the type checker and the tests"),
     "solve": ("ccr_ros.cli.solve", "solve one finger for given cable pulls"),
     "design": (

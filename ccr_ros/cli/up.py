@@ -22,7 +22,6 @@ from pathlib import Path
 from ccr_ros.model.errors import InvalidFile, InvalidValue
 
 DRIVERS = ("loopback", "ros2_control", "dynamixel")
-NODES = ("solver_node", "servo_bridge_node", "gripper_coordinator_node")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -61,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
     from ccr_ros.runtime import enable_ros
     from ccr_ros.stack.processes import SignalGuard
     from ccr_ros.stack.starter import starter_of_nodes
-    from ccr_ros.stack.up import Plan, Stack, arguments_for, keep_up, node_part
+    from ccr_ros.stack.up import NODES, Plan, Stack, arguments_for, keep_up, node_part
 
     for name in args.without:
         if name not in NODES:

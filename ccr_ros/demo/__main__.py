@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``python -m ccr_ros.demo`` runs the pull publisher; the demo starts it so, as its own process."""
+"""``python -m ccr_ros.demo`` runs the demo's ball; the demo starts it so, as its own process."""
 
 import sys
 
@@ -11,13 +11,14 @@ def main() -> int:
     """Make rclpy importable, then run the node; return its exit code."""
     try:
         enable_ros()
-        from ccr_ros.demo.pull_publisher import main as run
+        from ccr_ros.demo.ball import BallNode
+        from ccr_ros.nodes.runner import run
 
-        return run()
+        return run(BallNode, "demo_ball")
     except KeyboardInterrupt:
         return 0
     except CcrError as error:
-        print(f"pull_publisher: error: {error}", file=sys.stderr)
+        print(f"demo_ball: error: {error}", file=sys.stderr)
         return 1
 
 

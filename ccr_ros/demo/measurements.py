@@ -11,6 +11,7 @@ import numpy as np
 
 @dataclass
 class _FingerCount:
+    pulls: int = 0
     first_pulls: int | None = None  # stamps [ns] of pulls heard
     last_pulls: int = 0
     newest: int = 0  # stamp of the newest pose
@@ -38,6 +39,7 @@ class Measurements:
     def add_pulls(self, finger: str, stamp: int) -> None:
         """Note pulls that were published at ``stamp`` [ns]."""
         count = self._fingers[finger]
+        count.pulls += 1
         if count.first_pulls is None:
             count.first_pulls = stamp
         count.last_pulls = max(count.last_pulls, stamp)
@@ -92,8 +94,8 @@ class Measurements:
         """Fingers of which no pose has come yet that answers pulls."""
         return [name for name, count in self._fingers.items() if not count.arrivals]
 
-    def report(self, pulls_sent: int) -> Report:
-        """Sum up, given how many pull messages were published in all.
+    def report(self) -> Report:
+        """Sum up.
 
         At least one pose must have come (see `unanswered`).
         """
@@ -102,7 +104,7 @@ class Measurements:
         solve_times = np.concatenate([c.solve_times for c in counts])
         spans = [(len(c.arrivals) - 1, (c.arrivals[-1] - c.arrivals[0]) * 1e-9) for c in counts]
         return Report(
-            pulls_sent=pulls_sent,
+            pulls=sum(c.pulls for c in self._fingers.values()),
             poses=sum(len(c.arrivals) for c in counts),
             superseded=sum(c.superseded for c in counts),
             rate=float(np.mean([n / span if span > 0 else 0.0 for n, span in spans])),
@@ -121,7 +123,7 @@ class Report:
     """What was measured in a run.
 
     Attributes:
-        pulls_sent: Pull messages published, all fingers together.
+        pulls: Messages of measured pulls that were heard, all fingers together.
         poses: Poses that arrived, each the answer to one of these.
         superseded: Pulls that were not solved as a newer message came first.
         rate: Poses per second of a finger [Hz].
@@ -134,7 +136,7 @@ class Report:
         markers: Marker messages that arrived.
     """
 
-    pulls_sent: int
+    pulls: int
     poses: int
     superseded: int
     rate: float
@@ -148,14 +150,14 @@ class Report:
 
     @property
     def lost(self) -> int:
-        """Pulls that brought no pose and were not superseded in the solver node."""
-        return max(0, self.pulls_sent - self.poses - self.superseded)
+        """Pulls that no pose answered and that were not superseded in the solver node."""
+        return max(0, self.pulls - self.poses - self.superseded)
 
     def lines(self, force_unit: str) -> list[str]:
         """Return the report as lines for people."""
         fate = f"{self.poses} answered by a pose, {self.superseded} superseded by newer ones"
         if self.lost:
-            fate += f", {self.lost} lost on the way"
+            fate += f", {self.lost} not answered"
         contacts = f"{self.contacts} made"
         if self.contacts:
             contacts += f", up to {self.force:.3g} {force_unit}"
@@ -164,7 +166,7 @@ class Report:
         else:
             verdict = "every pose converged and stable"
         rows = (
-            ("pulls", f"{self.pulls_sent} sent; {fate}"),
+            ("pulls", f"{self.pulls} measured; {fate}"),
             ("poses", f"{self.rate:.1f} per second and finger; {verdict}"),
             ("latency", f"{_ms(self.latency)}, pulls published to pose received"),
             ("solve time", _ms(self.solve_time)),

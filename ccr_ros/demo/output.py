@@ -14,6 +14,8 @@ from ccr_ros.viz.recording_json import save_recording
 from ccr_ros.viz.replay import write_replay
 from ccr_ros.viz.strip import write_strip
 
+from .design import FILES
+
 STRIP, REPLAY, RECORDING = "strip.png", "replay.html", "recording.json"
 
 
@@ -27,7 +29,7 @@ def prepare_folder(folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
             pass
-        for name in (STRIP, REPLAY, RECORDING):
+        for name in (STRIP, REPLAY, RECORDING, *FILES):
             (folder / name).unlink(missing_ok=True)
     except FileExistsError:
         raise InvalidFile(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""demo_recorder: hears what the solver node publishes; records it and measures it."""
+"""demo_recorder: hears what the nodes publish; records it and measures it."""
 
 from __future__ import annotations
 
@@ -10,15 +10,28 @@ from typing import Any
 
 import numpy as np
 from builtin_interfaces.msg import Time as TimeMessage
-from ccr_msgs.msg import CablePulls, FingerState, ObjectArray
+from ccr_msgs.msg import CablePulls, FingerState, GripperState, ObjectArray, ServoState
+from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Point, PoseArray
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
+from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
 
 from ccr_ros.model import CcrError, Contact, FingerSolver, Gripper
 from ccr_ros.nodes.conversions import bodies_from_message
-from ccr_ros.nodes.qos import COMMAND_QUEUE, LATCHED, reliable
+from ccr_ros.nodes.qos import (
+    COMMAND,
+    COMMAND_QUEUE,
+    DIAGNOSTICS,
+    JOINT_STATES,
+    LATCHED,
+    reliable,
+)
+from ccr_ros.stack.bag import BagWriter, record_topic
 from ccr_ros.viz.recording import Recording
 from ccr_ros.viz.recording_builder import RecordingBuilder
 
@@ -34,19 +47,27 @@ _MAX_PARTIAL = 20  # poses of which some messages have come, per finger
 
 @dataclass(frozen=True)
 class Glimpse:
-    """One finger, just now: pull [% of the rest length], tip height in the gripper [m], ..."""
+    """One finger, just now.
+
+    Attributes:
+        pull: Of its first cable [% of the rest length].
+        tension: Of its first cable [N].
+        force: Sum of its contact forces [N].
+    """
 
     pull: float
-    tip_height: float
     tension: float
-    contacts: int
+    force: float
 
 
 class Recorder(Node):
     """Puts the messages of each pose together again and takes frames at an even rate.
 
+    Frames, and what is measured, count from `begin` on.
+
     Args:
         gripper: The gripper of the solver node in the same namespace.
+        bag: Where all topics are recorded as they are, or None.
         options: Of `rclpy.node.Node`.
 
     Attributes:
@@ -54,7 +75,7 @@ class Recorder(Node):
         state_count: Number of states received so far.
     """
 
-    def __init__(self, gripper: Gripper, **options: Any) -> None:
+    def __init__(self, gripper: Gripper, bag: BagWriter | None = None, **options: Any) -> None:
         super().__init__("demo_recorder", **options)
         self._gripper = gripper
         lengths = {m.finger.name: FingerSolver(m.finger).rest_lengths for m in gripper.fingers}
@@ -65,7 +86,7 @@ class Recorder(Node):
         self.state_count = 0
         self._states: dict[str, FingerState] = {}
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._start: float | None = None  # of the pulls, steady clock [s]
+        self._start: float | None = None  # steady clock [s]
         # By finger and stamp: the messages of one pose that have arrived, by topic.
         self._partial: dict[str, dict[int, dict[str, Any]]] = {n: {} for n in lengths}
         self._posed: set[str] = set()  # fingers of which a whole pose has arrived
@@ -79,14 +100,33 @@ class Recorder(Node):
             for topic in ("backbone", *(f"cables/{c}" for c in mounted.finger.cable_names)):
                 heard = partial(self._part_heard, name, topic)
                 self.create_subscription(PoseArray, f"{name}/{topic}", heard, _POSES)
+        # Of each servo: its finger, and the place of its cable there.
+        self._joints = {
+            f"{m.finger.name}_{cable}": (m.finger.name, j)
+            for m in gripper.fingers
+            for j, cable in enumerate(m.finger.cable_names)
+        }
+        self.create_subscription(JointState, "joint_states", self._joints_heard, JOINT_STATES)
         self.create_subscription(ObjectArray, "objects", self._objects_heard, LATCHED)
         # Counted, not looked at: left undecoded.
         self.create_subscription(MarkerArray, "markers", self._markers_heard, LATCHED, raw=True)
         self.create_timer(1.0 / _FRAMES_PER_SECOND, self._sample, clock=self._steady)
+        if bag is not None:
+            for kind, topic, qos in _topics(gripper):
+                record_topic(self, bag, kind, topic, qos)
+
+    def begin(self) -> None:
+        """Start to take frames and to measure."""
+        if self._start is None:
+            self._start = self._now()
+
+    def set_phase(self, phase: str) -> None:
+        """Say what is going on from now on, in a few words."""
+        self._builder.set_phase(phase)
 
     @property
     def elapsed(self) -> float | None:
-        """Time since the first pulls [s]; ``None`` before them."""
+        """Time since the beginning [s]; ``None`` before it."""
         return None if self._start is None else self._now() - self._start
 
     @property
@@ -104,18 +144,17 @@ class Recorder(Node):
         return {
             name: Glimpse(
                 pull=100.0 * state.pulls[0] / float(self._lengths[name][0]),
-                tip_height=float(self._bases[name].points(_vector(state.tip.position))[2]),
                 tension=state.tensions[0],
-                contacts=len(state.contacts),
+                force=sum(contact.force for contact in state.contacts),
             )
             for name, state in self._states.items()
         }
 
     def recording(self) -> Recording:
-        """Return what was recorded, from the first pulls on.
+        """Return what was recorded, from the beginning on.
 
         Raises:
-            InvalidValue: No pulls were heard, or no poses.
+            InvalidValue: No poses were heard since.
         """
         return self._builder.build()
 
@@ -123,9 +162,8 @@ class Recorder(Node):
         return self._steady.now().nanoseconds * 1e-9
 
     def _pulls_heard(self, finger: str, message: CablePulls) -> None:
-        self.measurements.add_pulls(finger, _nanoseconds(message.header.stamp))
-        if self._start is None:
-            self._start = self._now()
+        if self._start is not None:
+            self.measurements.add_pulls(finger, _nanoseconds(message.header.stamp))
 
     def _state_heard(self, finger: str, message: FingerState) -> None:
         arrival = self.get_clock().now().nanoseconds
@@ -189,6 +227,16 @@ class Recorder(Node):
             stale=state.stale,
         )
 
+    def _joints_heard(self, message: JointState) -> None:
+        angles: dict[str, dict[int, float]] = {}
+        for joint, angle in zip(message.name, message.position, strict=False):
+            if joint in self._joints:
+                finger, cable = self._joints[joint]
+                angles.setdefault(finger, {})[cable] = angle
+        for finger, known in angles.items():
+            if len(known) == len(self._lengths[finger]):
+                self._builder.add(finger, servo_angles=[known[j] for j in range(len(known))])
+
     def _objects_heard(self, message: ObjectArray) -> None:
         try:
             self._builder.set_objects(bodies_from_message(message, message.header.frame_id))
@@ -204,6 +252,31 @@ class Recorder(Node):
         # A state is heard before the rest of its pose: a frame waits for all of every finger.
         if self._start is not None and len(self._posed) == len(self._bases):
             self._builder.sample(self._now())
+
+
+def _topics(gripper: Gripper) -> list[tuple[type, str, QoSProfile]]:
+    """All that the nodes of a gripper publish, with what it is published as."""
+    topics: list[tuple[type, str, QoSProfile]] = [
+        (ObjectArray, "objects", LATCHED),
+        (MarkerArray, "markers", LATCHED),
+        (GripperState, "gripper_state", LATCHED),
+        (ServoState, "servo_state", LATCHED),
+        (JointState, "joint_states", JOINT_STATES),
+        (Float64MultiArray, "servo_commands", COMMAND),
+        (TFMessage, "/tf", reliable(depth=100)),
+        (TFMessage, "/tf_static", LATCHED),
+        (DiagnosticArray, "/diagnostics", DIAGNOSTICS),
+    ]
+    for mounted in gripper.fingers:
+        name = mounted.finger.name
+        topics += [
+            (CablePulls, f"{name}/cable_pull_commands", COMMAND),
+            (CablePulls, f"{name}/cable_pulls", COMMAND),
+            (FingerState, f"{name}/state", LATCHED),
+            (PoseArray, f"{name}/backbone", LATCHED),
+            *((PoseArray, f"{name}/cables/{c}", LATCHED) for c in mounted.finger.cable_names),
+        ]
+    return topics
 
 
 def _nanoseconds(stamp: TimeMessage) -> int:

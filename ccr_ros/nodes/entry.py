@@ -8,6 +8,8 @@ import signal
 import sys
 from importlib import import_module
 
+from ccr_ros.blas import use_one_thread
+
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
@@ -38,6 +40,7 @@ def gripper_coordinator_node() -> int:
 def _run(module: str, node: str) -> int:
     """Run the node of a class in a module of this package; both are imported here."""
     end_on_signals()
+    use_one_thread()
     from ccr_ros.model.errors import CcrError
     from ccr_ros.runtime import enable_ros
 

@@ -24,8 +24,8 @@ class Part:
     Attributes:
         name: Of the node.
         program: What follows ``python -m`` to run it as a process.
-        function: ``module:name`` of a function that runs it in a given context until its end, and
-            may return what the program prints.
+        function: ``module:name`` of the node's class, or of a function that runs it in a given
+            context until its end, and may return what the program prints.
     """
 
     name: str

@@ -7,6 +7,7 @@ import threading
 import time
 import traceback
 from collections.abc import Callable
+from functools import partial
 from importlib import import_module
 from types import TracebackType
 from typing import Any
@@ -16,6 +17,7 @@ from rclpy.context import Context
 from rclpy.signals import SignalHandlerOptions
 
 from ccr_ros.model import CcrError
+from ccr_ros.nodes.runner import spin
 
 from .parts import Part, Started
 
@@ -28,8 +30,10 @@ class NodeThread(Started):
     where = "in this process"
 
     def __init__(self, part: Part, ros_args: tuple[str, ...]) -> None:
-        module, _, function = part.function.partition(":")
-        run = getattr(import_module(module), function)
+        module, _, name = part.function.partition(":")
+        run = getattr(import_module(module), name)
+        if isinstance(run, type):
+            run = partial(spin, run)
         self.name = part.name
         self._output = ""
         self._exit_code: int | None = None

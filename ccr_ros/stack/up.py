@@ -16,12 +16,16 @@ from .processes import SignalGuard
 _LOOK_EVERY = 0.1  # s
 _RESTART_AFTER = 1.0  # s, so that a node that cannot start does not keep the machine busy
 
+#: The nodes of a gripper, in the order in which they are started.
+NODES = ("solver_node", "servo_bridge_node", "gripper_coordinator_node")
+
 Say = Callable[[str], object]
 
 
 def node_part(name: str) -> Part:
     """Return how a node of this package is started."""
-    return Part(name, ("ccr_ros.cli", "run", name), f"ccr_ros.nodes.{name}:spin")
+    kind = "".join(word.capitalize() for word in name.split("_"))
+    return Part(name, ("ccr_ros.cli", "run", name), f"ccr_ros.nodes.{name}:{kind}")
 
 
 @dataclass(frozen=True)
