@@ -82,11 +82,11 @@ def test_each_cable_has_a_stretch_of_its_own() -> None:
 
 @pytest.mark.long
 def test_intervals_hold_the_truth_as_often_as_they_say() -> None:
-    """Of 20 noisy sets, 95 % intervals miss the truth once on average; 5 misses have p < 0.003."""
+    """Of 12 noisy sets, 95 % intervals miss the truth 0.6 times on average; 4 have p = 0.002."""
     truth = {"EI": EI, "stretch": STRETCH}
     misses = dict.fromkeys(truth, 0)
     widths = []
-    for seed in range(20):
+    for seed in range(12):
         rows = measured(disks=(9,), nu=0.39, noise=NOISE, seed=seed)
         found = calibrate(rows, ("EI", "stretch"))
         for name, value in truth.items():
@@ -95,7 +95,7 @@ def test_intervals_hold_the_truth_as_often_as_they_say() -> None:
             widths.append((e.high - e.low) / value)
         assert found.position_scatter == pytest.approx(NOISE[0], rel=0.6)
         assert found.load_scatter == pytest.approx(NOISE[1], rel=0.7)
-    assert max(misses.values()) <= 4, misses
+    assert max(misses.values()) <= 3, misses
     assert max(widths) < 0.6  # and they are not so wide that they say nothing
 
 
