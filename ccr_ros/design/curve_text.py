@@ -14,9 +14,10 @@ from pathlib import Path
 from ..model import checks
 from ..model.errors import InvalidValue, UnknownName
 from ..model.finger import Finger
-from .contours import Section, contour
+from .contours import contour
 from .curve_files import load_curve
 from .curves import Curve, arc, helix, s_curve
+from .section import Section
 
 #: What each family's text looks like, for help and for errors. Options of contours: clearance
 #: (beyond the disks' radius, default 0), corner (radius of the object's corners, default 1 mm or

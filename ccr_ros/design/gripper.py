@@ -20,13 +20,14 @@ from ..model.files import Gripper, MountedFinger
 from ..model.finger import Finger
 from ..model.rotation import Pose
 from ..model.solution import Solution
-from .contours import LeadIn, Section, contour, lead_in, least_lead_in
+from .contours import LeadIn, contour, lead_in, least_lead_in
 from .curves import Curve
 from .gripper_layout import GripperLayout, check_apart, check_facing
 from .placement import place
 from .press import Press
 from .pull import Pull
 from .rest_shape import RestShape, RestShapeSolver
+from .section import Section
 from .target import DesiredShape
 from .verify import PullPath, pull_from_rest
 

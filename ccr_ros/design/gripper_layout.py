@@ -14,8 +14,8 @@ from ..model.errors import InvalidValue
 from ..model.finger import Finger
 from ..model.obstacles import Box, Cylinder, Obstacle, Sphere
 from ..model.rotation import Pose
-from .contours import Section
 from .curve_text import SizedObject
+from .section import Section
 
 MOST_FINGERS = 12
 _FACING = 1e-6  # rad

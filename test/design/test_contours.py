@@ -10,7 +10,8 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from ccr_ros.design.contours import Section, contour, lead_in, least_lead_in
+from ccr_ros.design.contours import contour, lead_in, least_lead_in
+from ccr_ros.design.section import Section
 from ccr_ros.model import InvalidValue
 
 from .test_curves import check_is_a_curve

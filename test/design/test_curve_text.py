@@ -15,10 +15,11 @@ from ccr_ros.cli.design.curve_arguments import (
     curve_from_args,
     shape_from_args,
 )
-from ccr_ros.design.contours import Section, contour
+from ccr_ros.design.contours import contour
 from ccr_ros.design.curve_text import SizedObject, curve_from_text, object_from_text
 from ccr_ros.design.curves import arc, helix, s_curve
 from ccr_ros.design.placement import place
+from ccr_ros.design.section import Section
 from ccr_ros.model import CcrError, InvalidValue
 
 FINGER = make_finger()

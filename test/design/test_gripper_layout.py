@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from model.fingers import helical_cable, make_finger, straight_cable
 
-from ccr_ros.design.contours import Section
 from ccr_ros.design.curve_text import SizedObject
 from ccr_ros.design.gripper_layout import GripperLayout, check_apart, check_facing
+from ccr_ros.design.section import Section
 from ccr_ros.model import Box, Cylinder, InvalidValue, Sphere, load_gripper
 from ccr_ros.resources import find_config
 
