@@ -15,6 +15,7 @@ from importlib.metadata import version
 
 from .measure import OWN, Row, measure, set_error
 from .memory import measure_memory
+from .routing import measure_search, searches
 from .suites import memory_plans, plans
 from .table import table
 from .tracking import measure_track, tracks
@@ -40,7 +41,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(table(rows))
         print(f"\n{len(rows)} rows in {seconds:.0f} s; {_machine()}")
     # Not the group "cable-model": with given spans a finger may have no pose clear of an obstacle.
-    groups = ("sweep", "pulls", "rest-shape")
+    groups = ("sweep", "pulls", "rest-shape", "routing")
     ours = (r for r in rows if r.group == "discretisation" or (r.group in groups and r.name == OWN))
     return int(any(row.converged < row.samples for row in ours))
 
@@ -68,7 +69,8 @@ def run(quick: bool, pattern: str = "*") -> list[Row]:
     ]
     sent = [row for plan in connections(quick) if wanted((row := plan.row()).id)]
     tracked = [row for plan in tracks(quick) if wanted((row := plan.row()).id)]
-    total = len(timed) + len(memory) + len(sent) + len(tracked)
+    searched = [row for plan in searches(quick) if wanted((row := plan.row()).id)]
+    total = len(timed) + len(memory) + len(sent) + len(tracked) + len(searched)
     rows: list[Row] = []
     for plan in timed:
         _progress(len(rows), total, plan.id)
@@ -82,6 +84,10 @@ def run(quick: bool, pattern: str = "*") -> list[Row]:
     for row in tracked:
         _progress(len(rows), total, row.id)
         measure_track(row, quick)
+        rows.append(row)
+    for row in searched:
+        _progress(len(rows), total, row.id)
+        measure_search(row, quick)
         rows.append(row)
     for row in sent:
         _progress(len(rows), total, row.id)

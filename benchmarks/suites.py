@@ -32,6 +32,7 @@ GROUPS: dict[str, str] = {
     "discretisation": "Accuracy against arcs per segment and their order",
     "pulls": "Pulls that follow a path of the tip (200 points; 25 if quick)",
     "rest-shape": "Rest shapes for a wanted shape (errors: of the forward model, from rest)",
+    "routing": "Routings for disk centres, found among 12 holes a disk",
     "memory": "Peak resident memory of build and five steps, above the imported libraries",
     "transport": "Messages between two processes, and a node that idles",
 }

@@ -15,6 +15,7 @@ from benchmarks.baselines import BASELINES, Ipopt
 from benchmarks.cartesian import LITERAL, CartesianProblem, Formulation
 from benchmarks.cases import CONTACT, TABLE_I, load_case, rms
 from benchmarks.measure import OwnSweeper, Plan, Row, measure
+from benchmarks.routing import measure_search, searches
 from benchmarks.suites import COMPARED, GROUPS, cartesian, memory_plans, own, plans
 from benchmarks.table import table
 from benchmarks.tracking import (
@@ -209,7 +210,7 @@ def test_full_plan_covers_what_is_promised():
         for n in (9, 30, 90):
             assert {f"sweep/{name}/n{n}/ccr_ros", f"sweep/{name}/n{n}/ipopt"} <= ids
         assert {f"sweep/{name}/n9/trust-constr", f"sweep/{name}/n9/slsqp"} <= ids
-    others = {"memory", "transport", "pulls"}
+    others = {"memory", "transport", "pulls", "routing"}
     assert {plan.group for plan in plans(quick=False)} | others == set(GROUPS)
     assert len(ids) == len(list(plans(quick=False)))
     assert len(set(memory_plans(quick=False))) == len(memory_plans(quick=False))
@@ -328,3 +329,21 @@ def test_a_tracked_row_tells_points_a_second():
     assert (row.steps, row.converged, row.samples) == (24, 24, 24)
     assert row.p50_ms > 0 and row.cpu_ms > 0 and 1 <= row.iterations <= 3
     assert "points a second" in row.note and row.id == "pulls/two_cables/n9/ccr_ros"
+
+
+def test_a_row_of_searched_routings_tells_how_many_are_found():
+    plans = {(s.case, s.solver): s for s in searches(quick=False)}
+    assert {case for case, _ in plans} == {"table_i", "random"}
+    row = plans["table_i", "ccr_ros"].row()
+    measure_search(row, quick=True)
+    assert (row.steps, row.converged, row.samples) == (3, 3, 3)
+    assert row.p50_ms > 0 and row.cpu_ms > 0 and "3 of 3 found" in row.note
+
+
+@pytest.mark.parametrize("solver", [s.solver for s in searches(quick=True)][1:])
+def test_nested_searches_of_routings_end_at_their_cap(solver, monkeypatch):
+    monkeypatch.setattr("benchmarks.routing._QUICK_CAP", 0.1)
+    row = next(s for s in searches(quick=True) if s.solver == solver).row()
+    measure_search(row, quick=True)
+    assert row.samples == 3 and 0 <= row.converged <= 3 and row.iterations >= 2
+    assert "stopped at 0.1 s" in row.note
