@@ -37,7 +37,6 @@ from .servo_topics import ServoTopics
 _STATE_RATE = 10.0  # Hz, at most; changes are told at once
 _HEARTBEAT = 0.4  # s, also where simulated time stands still
 _DIAGNOSTICS_PERIOD = 1.0  # s
-_SHORTEST_REPORT = 0.02  # s between diagnostics on refused commands
 
 
 class ServoBridgeNode(LifecycleNode):
@@ -74,7 +73,7 @@ class ServoBridgeNode(LifecycleNode):
         self._told: tuple[object, ...] = ()  # what was last told of the state
         self._starting = fixed.autostart
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)  # as sim time may stand still
-        self._reported_at = self._steady.now()
+        self._untold = False  # whether a command was refused that diagnostics do not tell yet
         self._topics = ServoTopics(self, fixed, self._refused)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", DIAGNOSTICS)
         self._health = ServoDiagnostics(self.get_fully_qualified_name(), fixed.rack.name)
@@ -231,6 +230,8 @@ class ServoBridgeNode(LifecycleNode):
         self._cycles += 1
         if self._cycles >= self._fixed.rate / _STATE_RATE or self._news() != self._told:
             self._tell()
+        if self._untold:
+            self._report()
 
     def _news(self) -> tuple[object, ...]:
         bridge = self._bridge
@@ -254,13 +255,11 @@ class ServoBridgeNode(LifecycleNode):
         self._topics.publish_state(self.get_clock().now().to_msg(), self._failure)
 
     def _refused(self) -> None:
-        """Tell of a refused command at once, but not of each of a flood."""
-        if (self._steady.now() - self._reported_at).nanoseconds * 1e-9 >= _SHORTEST_REPORT:
-            self._report()
+        self._untold = True  # the next cycle tells: once, of however many
 
     def _report(self) -> None:
         """Publish diagnostics."""
-        self._reported_at = self._steady.now()
+        self._untold = False
         status = self._health.status(self._bridge, self._topics, self._failure)
         header = Header(stamp=self.get_clock().now().to_msg())
         self._diagnostics.publish(DiagnosticArray(header=header, status=[status]))
