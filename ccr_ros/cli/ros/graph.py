@@ -58,6 +58,8 @@ def graph_node(
             start_parameter_services=False,
             parameter_overrides=[Parameter("use_sim_time", value=args.use_sim_time)],
         )
+        # Made when it is first asked for: a signal that comes just then has rclpy print errors.
+        rclpy.get_global_executor()
     except NameValidationException as error:
         rclpy.try_shutdown()
         raise _invalid_name(error) from error
