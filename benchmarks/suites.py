@@ -175,4 +175,4 @@ def _rest_shapes(quick: bool, effort: Effort) -> Iterator[Plan]:
         for method in ("least_squares",) if quick else ("least_squares", "slsqp"):
             nested = partial(NestedSweeper, finger, shape, method)
             label = f"scipy {method}, nested"
-            yield Plan("rest-shape", label, case, nested, baseline, 1, cap=24 * effort.cap)
+            yield Plan("rest-shape", label, case, nested, baseline, 1, cap=60 * effort.cap)

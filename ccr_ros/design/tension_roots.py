@@ -11,7 +11,7 @@ import numpy as np
 from .rest_statics import RestStatics
 
 _SAMPLES = 12  # of one cable's tension, values and slopes
-_STARTS = 4  # per cable, where there are several
+_STARTS = 3  # per cable, where there are several
 _MOST_STARTS = 64
 _NEWTON = 40
 _ZERO = 1e-13  # of the finger's length
