@@ -63,7 +63,6 @@ def contour(
     section: Section,
     clearance: float,
     join: float | None = None,
-    accept: Callable[[LeadIn], bool] | None = None,
 ) -> PlanarCurve:
     """Return the curve that leads to an object's contour and follows it to the curve's end.
 
@@ -74,7 +73,6 @@ def contour(
         clearance: Between the section and the backbone, the disks' radius included [m].
         join: Where on the contour the lead-in ends, counted along it from the middle of the side
             that faces the base, upwards [m]; ``None``: where it bends least.
-        accept: What else a lead-in must satisfy if no join is given.
 
     Raises:
         InvalidValue: The base is on or in the contour, no smooth lead-in outside of the contour
@@ -82,12 +80,16 @@ def contour(
     """
     length = checks.real("length", length, above=0, high=1e3, unit="m")
     wanted = section.grown(checks.real("clearance", clearance, above=0, high=1e3, unit="m"))
-    lead = lead_in(wanted, join) if join is not None else least_lead_in(wanted, accept)
+    lead = lead_in(wanted, join) if join is not None else least_lead_in(wanted)
     return follow(name, length, wanted, lead)
 
 
 def follow(name: str, length: float, wanted: Section, lead: LeadIn) -> PlanarCurve:
-    """Return the curve along a lead-in and then the contour that it leads to."""
+    """Return the curve along a lead-in and then the contour that it leads to; see `contour`.
+
+    Raises:
+        InvalidValue: The curve is too short to reach the contour, or long enough to come round.
+    """
     positions, headings = wanted.knots()
     longest = lead.length + float(positions[-1]) - lead.join
     if not lead.length < length <= longest:

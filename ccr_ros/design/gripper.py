@@ -20,7 +20,7 @@ from ..model.files import Gripper, MountedFinger
 from ..model.finger import Finger
 from ..model.rotation import Pose
 from ..model.solution import Solution
-from .contours import LeadIn, contour, lead_in, least_lead_in
+from .contours import LeadIn, follow, lead_in, least_lead_in
 from .curves import Curve
 from .gripper_layout import GripperLayout, check_apart, check_facing
 from .placement import place
@@ -177,11 +177,11 @@ def wanted_curve(task: GripperTask, section: Section) -> tuple[Curve, LeadIn]:
     """Return the curve that a finger shall take, and its lead-in.
 
     Raises:
-        InvalidValue: As `contours.contour`; or the finger touches on one side of the object's
-            middle only, or reaches above the top of a cylinder.
+        InvalidValue: As `contours.lead_in` and `contours.follow`; or the finger touches on one side
+            of the object's middle only, or reaches above the top of a cylinder.
     """
-    finger, clearance = task.template, task.template.disk_radius + task.clearance
-    wanted = section.grown(clearance)
+    finger = task.template
+    wanted = section.grown(finger.disk_radius + task.clearance)
 
     def positions(lead: LeadIn) -> np.ndarray:
         s = np.arange(finger.segments + 1) * finger.segment_length
@@ -210,7 +210,7 @@ def wanted_curve(task: GripperTask, section: Section) -> tuple[Curve, LeadIn]:
     else:
         lead = lead_in(wanted, task.join)
     name = f"contour of the {task.layout.body.kind}"
-    curve = contour(name, finger.length, section, clearance, lead.join)
+    curve = follow(name, finger.length, wanted, lead)
     if task.layout.body.kind == "cylinder":
         s = np.linspace(0, finger.length, 401)
         above = float(curve.points(s)[:, 2].max()) - section.up - section.half_height

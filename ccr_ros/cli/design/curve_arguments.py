@@ -13,9 +13,6 @@ from ccr_ros.design.shape_files import load_shape
 from ccr_ros.design.target import DesiredShape
 from ccr_ros.model import Finger, InvalidValue
 
-#: For the docstring of a command: what a curve may be.
-CURVES_HELP = "\n".join(f"  {form}" for form in ("points.csv", *FAMILIES.values()))
-
 
 def add_curve_arguments(parser: argparse.ArgumentParser, required: bool = True) -> None:
     """Declare ``--curve``, which must be given unless told otherwise, and ``--unit``."""

@@ -5,7 +5,7 @@ OBJECT is sphere:DIAMETER, cylinder:DIAMETERxHEIGHT or box:LENGTHxWIDTHxHEIGHT, 
 --center-height above the plane of the fingers' bases. These stand evenly around it, --base-radius
 from its axis; around a box (2, 3 or 4 fingers) each faces a side. Every finger follows the contour
 of the object, a disk's radius off it, below and above its middle. Writes a gripper file and its
-finger file for `ccr demo`, `ccr run solver_node` and `ccr solve`. The proof is the forward model,
+finger file for `ccr up`, `ccr run solver_node` and `ccr solve`. The proof is the forward model,
 pulled from rest with the object in place. Lengths in m. Exit code: 0 the fingers get there, stable
 and without a jump; 1 they do not, or no rest shape was found; 2 the input cannot be.
 
