@@ -217,7 +217,7 @@ def test_efforts_come_from_the_solver(servos, probe, start, start_bridge):
     servos.in_state(ServoState.ACTIVE)
     # Measured pulls go to the solver, its tensions come back as efforts.
     servos.lead_to("finger_3", 0.004)
-    probe.until(lambda: abs(servos.joint("finger_3_main").tension - 4.18) < 0.1, "its tension")
+    probe.until(lambda: abs(servos.joint("finger_3_main").tension - 4.18) < 0.3, "its tension")
     solved = probe.until(lambda: probe.states("finger_3") and probe.states("finger_3")[-1])
     assert solved.pulls[0] == pytest.approx(0.004, abs=2e-4)
     assert servos.joint("finger_1_main").tension == pytest.approx(0.0, abs=0.05)

@@ -73,6 +73,16 @@ sys.exit(servo_bridge_node())
     assert (tmp_path / "rack.yaml").exists()
 
 
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
+def test_a_rack_that_is_never_heard_of_does_not_keep_it(launch, tmp_path, how):
+    process = launch(*arguments(tmp_path), "-p", "driver:=ros2_control", "-p", "rate:=200.0")
+    line = ""
+    while "to be calibrated" not in line:  # it is configured, and waits for joint states
+        line = process.stderr.readline()
+        assert line, "the node ended"
+    assert end(process, how) == 0
+
+
 @pytest.mark.parametrize(
     ("words", "text"),
     [
