@@ -13,6 +13,7 @@ from ccr_ros.model.equilibrium import EquilibriumProblem, Evaluation
 
 from .bounded_step import bounded_step, curvature_bounds, kept
 from .pose_fit import PIECES, smooth_guess
+from .rest_statics import curvature_ends
 from .target import DesiredShape
 
 _ITERATIONS = 120
@@ -44,69 +45,23 @@ def nearest_pose(
         smoothness: See above. Without it, disks that are kept off a curve's inside are brought
             nearer by bending to and fro between them, as tightly as the limits allow.
     """
-    length, n = problem.finger.length, shape.segments
-    wanted = shape.points[1:] / length
-    free = np.tile([True, True, False], problem.size // 3)
-    scale = problem.coordinate_scale.reshape(2, 3)
-    to_ends = problem.rod_step * length  # arc coordinates per curvature
-    caps = limits * to_ends
-
-    def ends(y: np.ndarray) -> np.ndarray:
-        z = y.reshape(-1, 2, 3) * scale
-        return np.stack([z[:, 0] - z[:, 1], z[:, 0] + z[:, 1]], axis=1)
-
-    def from_ends(e: np.ndarray) -> np.ndarray:
-        z = np.stack([(e[:, 0] + e[:, 1]) / 2, (e[:, 1] - e[:, 0]) / 2], axis=1)
-        return (z / scale).ravel()
-
-    # Columns of y per (x, y) of both ends of each arc: the unknowns of a step.
-    unit = np.zeros((2, 3, 2, 3))
-    for axis in range(3):
-        unit[0, axis, :, axis], unit[1, axis, :, axis] = 0.5, [-0.5, 0.5]
-    unit /= scale[:, :, None, None]
-    columns = np.kron(np.eye(problem.arcs), unit.reshape(6, 6))[:, free]
-
-    turn = smoothness * PIECES  # a segment turns by that many times as much as an arc
-    changes = turn * _change_rows(problem.arcs) @ np.eye(6 * problem.arcs)[:, free]
-
-    def gap(at: Evaluation) -> np.ndarray:
-        away = (at.points[problem.points.backbone[1:]] - wanted).ravel() * n
-        return np.concatenate([away, changes @ ends(at.y).ravel()[free]])
-
-    def merit(at: Evaluation, price: float) -> float:
-        inside = np.maximum(_MARGIN - at.distances[:, ~problem.fixed], 0.0).sum()
-        return float(np.sum(gap(at) ** 2)) + price * float(inside)
-
-    at = problem.evaluate(from_ends(kept(ends(smooth_guess(problem, shape)), caps)))
+    search = _Search(problem, shape, limits, smoothness)
+    at = search.at(search.ends(smooth_guess(problem, shape)))
     damping, price = 1e-2, 1.0
     for _ in range(_ITERATIONS):
-        residual = gap(at)
-        first = problem.linearize(at)
-        moved = first.points[problem.points.backbone[1:]].reshape(-1, problem.size)
-        jacobian = np.concatenate([moved @ columns * n, changes])
-        bends = ends(at.y)
-        rows, room = curvature_bounds(bends.reshape(-1, 3), caps)
-        rows = rows[:, np.tile([True, True, False], rows.shape[1] // 3)]
-        near = at.distances < _BAND
-        near[:, problem.fixed] = False
-        if near.any():
-            contact, _, _ = problem.contact_rows(at, first, np.argwhere(near))
-            rows = np.concatenate([rows, contact @ columns])
-            room = np.concatenate([room, at.distances[near] - _MARGIN])
+        residual, jacobian, rows, room = search.linearized(at)
         found = bounded_step(residual, jacobian, damping, rows, room)
         if found is None:  # the bounds, linearised, leave no way
             break
         step, largest = found
         price = max(price, 2.0 * largest)
-        value = merit(at, price)
+        value = search.merit(at, price)
         if value < _EXACT:
             break
         longest = float(np.abs(step).max())
         step *= min(1.0, _LARGEST_STEP / max(longest, 1e-300))
-        change = np.zeros(bends.size)
-        change[free] = step
-        trial = problem.evaluate(from_ends(kept(bends + change.reshape(bends.shape), caps)))
-        gained = value - merit(trial, price)
+        trial = search.at(search.ends(at.y) + search.spread(step))
+        gained = value - search.merit(trial, price)
         promise = value - float(np.sum((residual + jacobian @ step) ** 2))
         if gained > 0:
             at = trial
@@ -119,6 +74,73 @@ def nearest_pose(
             if damping > 1e6:
                 break
     return at.y
+
+
+class _Search:
+    """The least-squares problem in the bending at both ends of every arc, as turn per arc [rad]."""
+
+    def __init__(
+        self,
+        problem: EquilibriumProblem,
+        shape: DesiredShape,
+        limits: np.ndarray,
+        smoothness: float,
+    ) -> None:
+        self._problem = problem
+        self._backbone = problem.points.backbone[1:]
+        self._segments = shape.segments
+        self._wanted = shape.points[1:] / problem.finger.length
+        self._turn = problem.rod_step * problem.finger.length  # of an arc, per curvature
+        self._limits = limits * self._turn
+        self._scale = problem.coordinate_scale.reshape(2, 3)
+        self._free = np.tile([True, True, False], 2 * problem.arcs)  # no twist
+        to_y = np.zeros((2, 3, 2, 3))  # of mean and linear part, per start and end
+        for axis in range(3):
+            to_y[0, axis, :, axis], to_y[1, axis, :, axis] = 0.5, [-0.5, 0.5]
+        to_y /= self._scale[:, :, None, None]
+        self._to_y = np.kron(np.eye(problem.arcs), to_y.reshape(6, 6))
+        # A segment turns by PIECES times as much as an arc.
+        self._changes = smoothness * PIECES * _change_rows(problem.arcs)[:, self._free]
+
+    def ends(self, y: np.ndarray) -> np.ndarray:
+        """Turn (E, 2, 3) of the arcs at both ends, at y (N,)."""
+        return curvature_ends(self._problem, y).reshape(-1, 2, 3) * self._turn
+
+    def at(self, ends: np.ndarray) -> Evaluation:
+        """The pose with this turn, pulled back into its bounds."""
+        return self._problem.evaluate(self._to_y @ kept(ends, self._limits).ravel())
+
+    def spread(self, step: np.ndarray) -> np.ndarray:
+        """The change (E, 2, 3) of turn that a step in the unknowns makes."""
+        change = np.zeros(self._free.size)
+        change[self._free] = step
+        return change.reshape(-1, 2, 3)
+
+    def merit(self, at: Evaluation, price: float) -> float:
+        """Squared residual, and the price of being inside obstacles."""
+        inside = np.maximum(_MARGIN - at.distances[:, ~self._problem.fixed], 0.0).sum()
+        return float(np.sum(self._residual(at) ** 2)) + price * float(inside)
+
+    def linearized(self, at: Evaluation) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Residual, Jacobian, and rows and room of the bounds on bending and of the distances."""
+        first = self._problem.linearize(at)
+        columns = self._to_y[:, self._free]
+        moved = first.points[self._backbone].reshape(-1, self._problem.size) @ columns
+        jacobian = np.concatenate([moved * self._segments, self._changes])
+        rows, room = curvature_bounds(self.ends(at.y).reshape(-1, 3), self._limits)
+        rows = rows[:, self._free]
+        near = at.distances < _BAND
+        near[:, self._problem.fixed] = False
+        if near.any():
+            contact, _, _ = self._problem.contact_rows(at, first, np.argwhere(near))
+            rows = np.concatenate([rows, contact @ columns])
+            room = np.concatenate([room, at.distances[near] - _MARGIN])
+        return self._residual(at), jacobian, rows, room
+
+    def _residual(self, at: Evaluation) -> np.ndarray:
+        """Disk errors in units of segments, and the weighted changes of bending."""
+        away = (at.points[self._backbone] - self._wanted).ravel() * self._segments
+        return np.concatenate([away, self._changes @ self.ends(at.y).ravel()[self._free]])
 
 
 def _change_rows(arcs: int) -> np.ndarray:
