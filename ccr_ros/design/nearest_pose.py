@@ -18,7 +18,7 @@ from .target import DesiredShape
 
 _ITERATIONS = 120
 _BAND = 0.1  # of the length; points nearer to an obstacle enter a step
-_MARGIN = 1e-9  # of the length; so far points stay clear, so that they do not press
+_MARGIN = 1e-7  # of the length; so far points stay clear, so that they do not press
 _LARGEST_STEP = 0.1  # rad, that an end's turn per arc may change by
 SMOOTH = 0.2  # of a segment's length: what a change of bending counts as; see `nearest_pose`
 _FLAT = 1e-6  # relative decrease that a step is worth
