@@ -55,6 +55,7 @@ class ServoBridge:
         self._active = self._stopped = False
         self._now: float | None = None
         self._silent_since: float | None = None
+        self._unwritten = False  # whether the newest setpoints could not be sent
         self._commanded_at: dict[int, float] = {}
         self._calibrator: Calibrator | None = None
         self._calibrated: Callable[[dict[str, float], str], None] | None = None
@@ -112,22 +113,23 @@ class ServoBridge:
         try:
             reading = self.driver.read(now)
         except BusLost as error:
-            self._miss(str(error))
+            self._miss(now, str(error))
             return False
-        self._silent_since, self._waiting = None, ""
+        self._waiting = ""
+        if not self._unwritten:
+            self._silent_since = None
         self.measured_at = now
         for index, axis in enumerate(self.axes):
             axis.measure(reading, index, dt)
         return True
 
-    def _miss(self, why: str) -> None:
+    def _miss(self, now: float, why: str) -> None:
         """Count the time without an answer; before the first activation none is owed."""
-        assert self._now is not None
-        if self._silent_since is None or self._now < self._silent_since:
-            self._silent_since = self._now
+        if self._silent_since is None or now < self._silent_since:
+            self._silent_since = now
         if not self.leading:
             self._waiting = why
-        elif self._now - self._silent_since >= self.settings.bus_timeout and not self.fault:
+        elif now - self._silent_since >= self.settings.bus_timeout and not self.fault:
             self._fail(Fault(FaultCode.BUS_LOST, "", why))
 
     def _look(self, now: float) -> Fault | None:
@@ -176,12 +178,14 @@ class ServoBridge:
 
     def _write(self) -> None:
         lost = self.fault is not None and self.fault.code == FaultCode.BUS_LOST
-        if lost or not self.leading:
+        if lost or not self.leading or self._now is None:
             return  # who comes back from a lost bus may have been moved meanwhile
         try:
             self.driver.write(self.setpoints)
+            self._unwritten = False
         except BusLost as error:
-            self._miss(str(error))
+            self._unwritten = True
+            self._miss(self._now, str(error))
 
     def _freeze(self, ease: str = "") -> None:
         """Stop all servos at once; `ease`: joints whose setpoint may not pull ahead."""
@@ -262,6 +266,7 @@ class ServoBridge:
             try:
                 self.driver.recover()
                 self._adopt(now)
+                self._unwritten = False
             except (BusLost, DriverError) as error:
                 raise Refused(f"{fault.code.name}: {error}") from None
         for axis in self.axes:

@@ -62,6 +62,9 @@ class ServoDiagnostics:
         uncalibrated = [axis.joint.name for axis in bridge.axes if not axis.calibrated]
         if uncalibrated:
             doubts.append(f"to be calibrated: {', '.join(uncalibrated)}")
+        unfelt = [axis.joint.name for axis in bridge.axes if math.isnan(axis.tension)]
+        if unfelt and bridge.leading:
+            doubts.append(f"tension not known, so not limited: {', '.join(unfelt)}")
         doubts = [doubt for doubt in doubts if doubt]
         if doubts:
             return DiagnosticStatus.WARN, "; ".join(doubts)

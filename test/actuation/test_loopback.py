@@ -130,6 +130,17 @@ def test_a_state_file_of_something_else(tmp_path, content, error, text):
         driver(state_file=file)
 
 
+def test_a_disk_that_fills_up_is_a_lost_bus(tmp_path):
+    file = tmp_path / "folder" / "rack.yaml"
+    servos = driver(state_file=file)
+    file.unlink()
+    file.parent.rmdir()
+    file.parent.write_text("in its way")
+    servos.write([1.0, 1.0])
+    with pytest.raises(BusLost, match="cannot be written"):
+        servos.read(0.1)
+
+
 def test_a_state_file_that_cannot_be_written(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(InvalidFile, match="cannot be written"):

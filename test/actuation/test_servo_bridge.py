@@ -255,6 +255,24 @@ def test_lost_bus():
     assert bench.pulls[0] == pytest.approx(0.0, abs=2e-5)
 
 
+def test_servos_that_can_be_read_and_not_written_are_lost_too():
+    bench = Bench(servos=STIFF).active()
+
+    def lost(angles):
+        raise BusLost("the wire is cut")
+
+    write, bench.driver.write = bench.driver.write, lost
+    bench.until(lambda: bench.bridge.fault, 1.0)
+    assert (bench.bridge.fault.code, bench.bridge.fault.reason) == (
+        FaultCode.BUS_LOST,
+        "the wire is cut",
+    )
+    bench.driver.write = write
+    bench.bridge.reset(bench.now)
+    bench.run(1.0, thumb=0.002)
+    assert bench.pulls[0] == pytest.approx(0.002, abs=2e-5)
+
+
 def test_what_a_servo_reports_itself_is_a_fault():
     bench = Bench(servos=STIFF).active()
     read = bench.driver.read

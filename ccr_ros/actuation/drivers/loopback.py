@@ -177,7 +177,10 @@ class LoopbackDriver(ServoDriver):
         np.clip(self._spools, self._motors - play, self._motors + play, out=self._spools)
         self._velocities = (self._spools - before) / dt
         if np.any(np.abs(moved) > 1e-9):
-            self._keep()
+            try:
+                self._keep()
+            except InvalidFile as error:  # servos that cannot keep their place are out of order
+                raise BusLost(str(error)) from None
 
     def _keep(self) -> None:
         if self._state_file is None:
