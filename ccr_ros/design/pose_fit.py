@@ -47,32 +47,31 @@ class PoseFit:
 
 def fit_pose(problem: EquilibriumProblem, shape: DesiredShape) -> PoseFit:
     """Return the pose, of a problem whose rest shape is straight in ``PIECES`` arcs per segment."""
-    n, segment = shape.segments, 1.0 / shape.segments
+    n = shape.segments
     length = problem.finger.length
     points = shape.points / length
     tangents = _wanted_tangents(shape, length)
-    free = np.ones((2 * PIECES, 3), dtype=bool)
-    free[:, 2] = shape.frames is not None
-    columns = np.flatnonzero(free.ravel())
-    frames = _untwisted(tangents) if shape.frames is None else shape.frames
-    z = _guess(frames)
-    weigh = _cheapest(columns)
-    rod = problem.rod
+    twisted = shape.frames is not None
+    frames = shape.frames if shape.frames is not None else _untwisted(tangents)
+    free = np.tile([True, True, twisted], 2 * PIECES)
+    weigh = _cheapest(np.flatnonzero(free))
+    rod, z = problem.rod, _guess(frames)
     for _ in range(_ITERATIONS):
-        state = rod.state(z)
-        gap, rows = _gaps(state, points, tangents, shape.frames, segment)
+        gap, rows = _gaps(rod.state(z), points, frames, twisted)
         if np.abs(gap).max() < _DONE:
             break
-        rows = rows[:, :, columns]
-        gram = rows @ weigh @ rows.transpose(0, 2, 1)
+        rows = rows[:, :, free]
+        back = weigh @ rows.transpose(0, 2, 1)
+        gram = rows @ back
         gram += _DAMPING * np.eye(gram.shape[1])
-        step = -(weigh @ rows.transpose(0, 2, 1) @ np.linalg.solve(gram, gap[:, :, None]))[:, :, 0]
-        step *= np.minimum(1.0, _LARGEST_STEP / np.maximum(np.abs(step).max(axis=1), 1e-300))[
-            :, None
-        ]
+        step = -(back @ np.linalg.solve(gram, gap[:, :, None]))[:, :, 0]
+        largest = np.maximum(np.abs(step).max(axis=1, keepdims=True), 1e-300)
+        step *= np.minimum(1.0, _LARGEST_STEP / largest)
         change = np.zeros((n, free.size))
-        change[:, columns] = step
+        change[:, free] = step
         z = z + change.reshape(z.shape)
+    if not twisted:
+        z = _joined(rod.state(z), z, frames)
     state = rod.state(z)
     centres, axes = state.positions[::PIECES], state.rotations[::PIECES, :, 2]
     off = (centres - points) * length
@@ -94,43 +93,54 @@ def _wanted_tangents(shape: DesiredShape, length: float) -> np.ndarray:
 
 
 def _gaps(
-    state: RodState,
-    points: np.ndarray,
-    tangents: np.ndarray,
-    frames: np.ndarray | None,
-    segment: float,
+    state: RodState, points: np.ndarray, frames: np.ndarray, twisted: bool
 ) -> tuple[np.ndarray, np.ndarray]:
     """What each segment's end misses (n, c), and its derivatives (n, c, 12) by its coordinates.
 
-    All is seen from the segment's first disk, whose axis is put along the wanted tangent by the
-    smallest turn: then segments that are not yet right do not disturb those beyond.
+    All is seen from the segment's first disk, in ``frames``: a segment alone is looked at, whatever
+    those before it do. What its end shall meet is the way there and the tangent, or the frame.
     """
     n = len(points) - 1
     rotations, centres = state.rotations[::PIECES], state.positions[::PIECES]
-    if frames is None:
-        seen = _turned_to(rotations[:-1], tangents[:-1])
-    else:
-        seen = frames[:-1]
-    way = np.einsum("nij,ni->nj", seen, points[1:] - points[:-1])
+    seen = frames[:-1].transpose(0, 2, 1)
+    way = (seen @ (points[1:] - points[:-1])[:, :, None])[:, :, 0]
     back = rotations[:-1].transpose(0, 2, 1)
     local = back @ rotations[1:]
-    gone = np.einsum("nij,nj->ni", back, centres[1:] - centres[:-1])
+    gone = (back @ (centres[1:] - centres[:-1])[:, :, None])[:, :, 0]
     twists = state.twists.reshape(n, -1, 6)
     spin = twists[:, :, :3]
     shift = twists[:, :, 3:] + cross(spin, centres[1:, None, :])
     spin, shift = spin @ rotations[:-1], shift @ rotations[:-1]
-    if frames is None:
-        wanted = np.einsum("nij,ni->nj", seen, tangents[1:])
-        sides = local[:, :, :2].transpose(0, 2, 1)  # of the end's disk, in it
-        turn = sides @ wanted[:, :, None]
-        turn_rows = cross(sides, wanted[:, None, :]) @ spin.transpose(0, 2, 1)
-    else:
+    if twisted:
         relative = frames[1:].transpose(0, 2, 1) @ frames[:-1] @ local
-        turn = 0.5 * (relative - relative.transpose(0, 2, 1))[:, [2, 0, 1], [1, 2, 0], None]
+        turn = 0.5 * (relative - relative.transpose(0, 2, 1))[:, [2, 0, 1], [1, 2, 0]]
         turn_rows = (spin @ local).transpose(0, 2, 1)
-    gap = np.concatenate([(gone - way) / segment, turn[:, :, 0]], axis=1)
-    rows = np.concatenate([shift.transpose(0, 2, 1) / segment, turn_rows], axis=1)
+    else:
+        wanted = seen @ frames[1:, :, 2, None]
+        sides = local[:, :, :2].transpose(0, 2, 1)  # of the end's disk, in it
+        turn = (sides @ wanted)[:, :, 0]
+        turn_rows = cross(sides, wanted.transpose(0, 2, 1)) @ spin.transpose(0, 2, 1)
+    gap = np.concatenate([(gone - way) * n, turn], axis=1)
+    rows = np.concatenate([shift.transpose(0, 2, 1) * n, turn_rows], axis=1)
     return gap, rows
+
+
+def _joined(state: RodState, z: np.ndarray, frames: np.ndarray) -> np.ndarray:
+    """Coordinates (2 n, 6) of segments that were solved in ``frames``, in the frames of a chain.
+
+    A segment free of twist is the same in any frame turned about its first tangent; its bending
+    alone is turned. A chain's frames are turned by all that the segments before end off ``frames``.
+    """
+    rotations = state.rotations[::PIECES]
+    ends = frames[:-1] @ rotations[:-1].transpose(0, 2, 1) @ rotations[1:]
+    off = frames[1:].transpose(0, 2, 1) @ ends  # about z, as the tangents agree
+    angles = np.cumsum(np.arctan2(off[:, 1, 0] - off[:, 0, 1], off[:, 0, 0] + off[:, 1, 1]))
+    angles = np.concatenate([[0.0], angles[:-1]])
+    c, s = np.cos(angles)[:, None], np.sin(angles)[:, None]
+    vectors = z.reshape(len(angles), -1, 3)
+    x, y = vectors[:, :, 0], vectors[:, :, 1]
+    turned = np.stack([c * x + s * y, c * y - s * x, vectors[:, :, 2]], axis=2)
+    return turned.reshape(z.shape)
 
 
 def _cheapest(columns: np.ndarray) -> np.ndarray:

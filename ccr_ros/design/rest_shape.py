@@ -16,7 +16,7 @@ from ccr_ros.model import checks
 from ccr_ros.model.equilibrium import EquilibriumProblem
 from ccr_ros.model.errors import InvalidValue, UnknownName
 from ccr_ros.model.finger import Finger
-from ccr_ros.model.result import softest_direction
+from ccr_ros.model.result import smallest_eigenvalue
 from ccr_ros.model.settings import SolverSettings
 from ccr_ros.model.sqp import KktPoint, derive
 
@@ -200,7 +200,7 @@ def rest_shape_at(
         largest_curvature=float(bending.max()),
         rest_gap=float(gaps.min(initial=np.inf)) * length,
         residual=point.residual,
-        smallest_eigenvalue=softest_direction(point)[0],
+        smallest_eigenvalue=smallest_eigenvalue(point),
         squared_error=squared_error,
     )
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from .rest_statics import RestStatics
 
-_SAMPLES = 12  # of one cable's tension, values and slopes
+_SAMPLES = 8  # of one cable's tension, values and slopes
 _STARTS = 3  # per cable, where there are several
 _MOST_STARTS = 64
 _NEWTON = 40

@@ -39,7 +39,7 @@ def softest_direction(point: KktPoint) -> tuple[float, np.ndarray]:
     return float(values[0]), null @ vectors[:, 0]
 
 
-def _smallest_eigenvalue(point: KktPoint) -> float:
+def smallest_eigenvalue(point: KktPoint) -> float:
     """Smallest eigenvalue of the reduced Hessian, without the null space's basis.
 
     Projected with P = 1 - Q Q', Q an orthonormal basis of the active gradients, and with Q's own
@@ -78,7 +78,7 @@ def make_solution(
     finger, at, length = problem.finger, point.at, problem.finger.length
     force_unit = finger.bending_stiffness / length**2
     disks = np.arange(finger.segments + 1) * problem.arcs_per_segment
-    eigenvalue = _smallest_eigenvalue(point)
+    eigenvalue = smallest_eigenvalue(point)
     z = at.z / problem.rod_step
     arcs = (finger.segments, problem.arcs_per_segment, problem.rod.order + 1, 3)
     metres = at.points * length
