@@ -24,7 +24,7 @@ from .pull import Pull
 from .routing_chain import Target
 from .routing_free import Fit, fitted
 from .routing_result import RoutingCandidate, RoutingDesign, verified
-from .routing_search import RoutingSearch
+from .routing_search import GOOD, Found, RoutingSearch
 from .segments import SegmentModel
 from .target import DesiredShape
 
@@ -33,6 +33,7 @@ TOLERANCE = 1e-4  # m, of a disk
 _WIDTH = 128
 _MOST_HOLES = {1: 120, 2: 24}  # with which the search takes seconds, not minutes
 _FREE_STARTS = 8
+_FREE_NEAR = 2e-3  # RMS error of a disk, units of L, of a start that is tried first
 _FREE_HOLES = 12  # among which the search for free angles begins
 _FREE_EXACT = 1e-10  # m, RMS of a disk: no other start is tried
 _CORRECTIONS = 8
@@ -138,9 +139,20 @@ def _snapped(task: _Task, count: int) -> list[RoutingCandidate]:
 
 
 def _free(task: _Task, count: int) -> list[RoutingCandidate]:
-    search, length = task.search, task.finger.length
     fits: list[Fit] = []
-    for one in search.run()[:_FREE_STARTS]:
+    for good in (_FREE_NEAR, GOOD):  # a start need not be the nearest; else one that is
+        task.search.good = good
+        if _fit_from(task, task.search.run()[:_FREE_STARTS], fits):
+            break
+    fits.sort(key=lambda f: f.cost)
+    made = [_corrected(task, fit) for fit in fits[:count]]
+    return [c for c in made if c]
+
+
+def _fit_from(task: _Task, starts: list[Found], fits: list[Fit]) -> bool:
+    """Fit angles from starts, each answer once, until one is exact; tell whether one is."""
+    search = task.search
+    for one in starts:
         if not math.isfinite(one.cost):
             break
         start = search.holes[search.choices[list(one.states)]]
@@ -150,11 +162,9 @@ def _free(task: _Task, count: int) -> list[RoutingCandidate]:
         turned = np.exp(1j * fit.angles)
         if not any(np.abs(turned - np.exp(1j * f.angles)).max() < _SAME_ANGLE for f in fits):
             fits.append(fit)
-        if math.sqrt(fit.cost / len(fit.points)) * length < _FREE_EXACT:
-            break
-    fits.sort(key=lambda f: f.cost)
-    made = [_corrected(task, fit) for fit in fits[:count]]
-    return [c for c in made if c]
+        if math.sqrt(fit.cost / len(fit.points)) * task.finger.length < _FREE_EXACT:
+            return True
+    return False
 
 
 def _corrected(task: _Task, fit: Fit) -> RoutingCandidate | None:

@@ -23,7 +23,7 @@ from .segments import SegmentModel
 _SPREAD = {1: 0.12, 2: 0.4}  # of the tensions about those tried, relative
 _SETTLED = 0.03  # tensions that change by less are not tried again, relative
 _NOISE = 1e-3  # of positions, units of L, against which the spread is held
-_GOOD = 1e-4  # RMS error of a disk, units of L, at which no further tensions are tried
+GOOD = 1e-4  # RMS error of a disk, units of L, at which no further tensions are tried
 _SMALL = 2  # changes of hole that are tried first where there are two cables
 _MARGIN = 2  # times as many as are kept are laid exactly
 _KEPT = 24  # routings that go from one stage to the next
@@ -49,6 +49,7 @@ class RoutingSearch:
         target: Wanted disks and pulls.
         width: Number of routings that are kept at a disk.
         most: Largest change of hole from a disk to the next; ``None``: any.
+        good: RMS error of a disk, units of L, with which the search is content.
     """
 
     def __init__(
@@ -58,6 +59,7 @@ class RoutingSearch:
         target: Target,
         width: int,
         most: int | None = None,
+        good: float = GOOD,
     ) -> None:
         self.model = model
         self.holes = holes
@@ -66,6 +68,7 @@ class RoutingSearch:
         self.cables = len(target.pulls)
         self.forecast = Forecast(model, holes, target)
         self.most = most
+        self.good = good
         self.choices = np.array(list(product(range(len(holes)), repeat=self.cables)))  # (S, C)
         self._limit(most)
 
@@ -78,7 +81,7 @@ class RoutingSearch:
             self._limit(most)
             small = most is not None and most <= _SMALL
             kept = self._merged(kept, self._searched(small))
-            if self._rms(kept) < _GOOD:
+            if self._rms(kept) < self.good:
                 break
         return self._exchanged(kept)
 
@@ -96,7 +99,7 @@ class RoutingSearch:
             found = self._beam(self._table(tensions), _SPREAD[self.cables])
             heads.append(found[0])
             kept = self._merged(kept, found)
-            if self._rms(kept) < _GOOD:
+            if self._rms(kept) < self.good:
                 return kept
         return self._again(kept, heads)
 
@@ -112,7 +115,7 @@ class RoutingSearch:
                 done.append(tensions)
                 found = self._beam(self._table(tensions), _SETTLED)
                 kept = self._merged(kept, found)
-                if self._rms(kept) < _GOOD:
+                if self._rms(kept) < self.good:
                     return kept
                 if not np.isfinite(found[0].cost):
                     break

@@ -116,7 +116,7 @@ def angle_errors(a: Finger, b: Finger) -> np.ndarray:
     return np.array([np.abs(np.angle(np.exp(1j * (p.angles - q.angles)))) for p, q in pairs])
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 def test_free_angles_come_back(seed):
     rng = np.random.default_rng(100 + seed)
     rest = rng.normal(size=(9, 3)) * [4.0, 4.0, 1.0] if seed % 3 == 2 else None
