@@ -14,11 +14,11 @@ class ForceLaw:
     a lag and a delay of servo and solver that are T seconds together. As the phase lost at a
     frequency w is at most w T, and the loop's gain is 1 at w <= gain k, the loop is stable while
     gain k T < pi/2, and well damped (60 deg of phase in hand) while gain k T < 1/2. The sphere
-    gripper has k = 720 N/m: with the default gain T may be 0.35 s.
+    gripper has k = 720 N/m: with the default gain T may be 0.23 s.
 
     `Grip.regulate` takes one step for each pose that is solved, which counts for 0.1 s at most.
     However slow the solver is, its delay is then d such steps, and the loop is stable while
-    gain k 0.1 s < 2 sin(pi / (2 (2 d + 1))): with the defaults for a delay of up to 10 poses.
+    gain k 0.1 s < 2 sin(pi / (2 (2 d + 1))): with the defaults for a delay of up to 6 poses.
 
     Attributes:
         gain: [m/(N s)]

@@ -66,10 +66,10 @@ class GraspSettings:
         0.02, 1e-6, 1e3, "N", "The target force is reached when it is missed by at most this."
     )
     press_rate: float = _setting(
-        0.1, 1e-4, 1e3, "N/s", "Rate at which all fingers together raise their force."
+        0.2, 1e-4, 1e3, "N/s", "Rate at which all fingers together raise their force."
     )
     force_gain: float = _setting(
-        0.002, 1e-6, 1.0, "m/(N s)", "Gain of the force regulation; see docs/grasping.md."
+        0.003, 1e-6, 1.0, "m/(N s)", "Gain of the force regulation; see docs/grasping.md."
     )
     force_speed: float = _setting(
         0.0005, 1e-6, 0.1, "m/s", "Fastest motion of the force regulation."

@@ -53,7 +53,7 @@ def test_what_fails_while_it_closes_or_holds(plant, what, phase):
     run = plant.grasp(force=0.3)
     if phase == "holding":
         assert plant.finish(run).reached
-        run = plant.grasp(force=0.31)
+        run = plant.grasp(force=0.45)
     else:
         plant.until(lambda: plant.gripper.phase == phase)
     start = plant.now

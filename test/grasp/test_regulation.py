@@ -54,7 +54,7 @@ def test_the_bound_of_stability_is_one(stiffness, delay):
 def test_defaults_on_the_sphere_gripper(start):
     settings = GraspSettings()
     law = ForceLaw(settings.force_gain, settings.force_speed, settings.force_dead_band)
-    course = forces(law, 720.0, 0.15, 0.1, 0.2, start, seconds=10.0)
+    course = forces(law, 720.0, 0.1, 0.1, 0.2, start, seconds=10.0)
     assert abs(course[-100:] - 0.2).max() <= settings.force_dead_band
     overshoot = max(course.max() - max(0.2, start), min(0.2, start) - course.min())
     assert overshoot < 0.01
@@ -66,3 +66,19 @@ def test_rate_and_dead_band():
     assert law.step(5.0, 0.0, 2.0) == pytest.approx(-0.002)
     assert law.step(0.2, 0.21, 1.0) == 0.0
     assert law.step(0.2, 0.2001, 1.0) == 0.0
+
+
+@pytest.mark.parametrize("delay", [0, 3, 6])
+def test_one_step_a_pose_is_stable_for_six_poses_of_delay(delay):
+    """As docs/grasping.md says of the defaults; every pose counts for 0.1 s, however late."""
+    settings, stiffness = GraspSettings(), 720.0
+    law = ForceLaw(settings.force_gain, math.inf)
+    bound = 2 * math.sin(math.pi / (2 * (2 * delay + 1)))
+    assert settings.force_gain * stiffness * 0.1 < bound
+    late = deque([0.3] * (delay + 1), maxlen=delay + 1)
+    place, swing = 0.3 / stiffness, []
+    for _ in range(600):
+        place += law.step(late[0], 0.2, 0.1)
+        late.append(stiffness * place)
+        swing.append(abs(late[-1] - 0.2))
+    assert max(swing[-50:]) < 0.5 * max(swing[:50])
