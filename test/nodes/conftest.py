@@ -65,8 +65,8 @@ def stack(context: Context, probe: Probe) -> Iterator[Callable[..., GripperStack
     """Return a function that starts a gripper's nodes; values are the coordinator's parameters."""
     started = []
 
-    def start(at: float = 0.0, **values: Any) -> GripperStack:
-        started.append(GripperStack(context, probe, at, **values))
+    def start(**values: Any) -> GripperStack:
+        started.append(GripperStack(context, probe, **values))
         return started[-1]
 
     yield start

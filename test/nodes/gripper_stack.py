@@ -25,8 +25,12 @@ FINGERS = ("finger_1", "finger_2", "finger_3")
 BALL = sphere("ball", 0.056, (0.0, 0.0, 0.11))
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
-# In a hurry, but patient with a machine that is not.
+OPEN = 0.004  # m
+
+# In a hurry, but patient with a machine that is not: the ball is touched at 5.35 mm.
 QUICK = {
+    **{f"{name}.open_pulls": [OPEN] for name in FINGERS},
+    "blind_lead": 0.0006,
     "control_rate": 25.0,
     "open_speed": 0.01,
     "close_speed": 0.004,
@@ -49,7 +53,7 @@ class FakeBridge(Node):
     RATE = 25.0
     LAG = 0.06
 
-    def __init__(self, context: Context, at: float = 0.0) -> None:
+    def __init__(self, context: Context, at: float = OPEN) -> None:
         super().__init__("fake_bridge", namespace="gripper", context=context)
         self.at = dict.fromkeys(FINGERS, at)
         self.wanted = dict(self.at)
@@ -137,7 +141,7 @@ class GripperStack:
     """The nodes, and what a person does with them."""
 
     def __init__(
-        self, context: Context, probe: Probe, at: float = 0.0, bridge: Any = None, **values: Any
+        self, context: Context, probe: Probe, at: float = OPEN, bridge: Any = None, **values: Any
     ) -> None:
         self.context = context
         self.probe = probe

@@ -35,17 +35,18 @@ def command(stack):
 
 def test_to_a_position_and_back(command):
     stack, send = command
-    goal = send(0.10)
+    goal = send(0.07)
     result = goal.result()
     assert goal.status == GoalStatus.STATUS_SUCCEEDED
     assert (result.reached_goal, result.stalled) == (True, False)
-    assert result.position == pytest.approx(0.10, abs=0.005)
+    assert result.position == pytest.approx(0.07, abs=0.005)
     assert stack.now.state == "ready"
-    result = send(0.13).result()
+    result = send(0.08).result()
     assert result.reached_goal
-    assert result.position == pytest.approx(0.13, abs=0.005)
+    assert result.position == pytest.approx(0.08, abs=0.005)
 
 
+@pytest.mark.long
 def test_on_an_object_with_an_effort(command):
     stack, send = command
     stack.show(BALL)

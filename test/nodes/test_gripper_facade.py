@@ -31,6 +31,7 @@ def running(stack):
         thread.join()
 
 
+@pytest.mark.long
 def test_grasp_hold_release(running, monkeypatch):
     stack, gripper = running
     assert gripper.state.state == "idle"

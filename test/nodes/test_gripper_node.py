@@ -6,7 +6,7 @@ import math
 import pytest
 from action_msgs.msg import GoalStatus
 from diagnostic_msgs.msg import DiagnosticStatus
-from gripper_stack import BALL, FINGERS
+from gripper_stack import BALL, FINGERS, OPEN
 from probe import sphere
 
 
@@ -45,9 +45,10 @@ def test_grasp_hold_and_timed_release(stack):
     remaining = [message.remaining for message in goal.feedback]
     assert remaining[0] > 0.5 and remaining[-1] == 0.0
     assert forces(result) == [0.0, 0.0, 0.0]
-    assert all(abs(finger.pulls_measured[0]) < 3e-4 for finger in result.fingers)
+    assert all(abs(finger.pulls_measured[0] - OPEN) < 3e-4 for finger in result.fingers)
 
 
+@pytest.mark.long
 def test_an_object_that_grows_and_shrinks_is_held_with_the_same_force(stack):
     stack = stack().holding()
 
@@ -81,9 +82,9 @@ def test_stop_keeps_the_grip_and_hold_goes_on(stack):
 
 
 def test_cancelled_grasp_stops_and_keeps_its_place(stack):
-    stack = stack(close_speed=0.002).ready()
+    stack = stack(close_speed=0.001).ready()
     goal = stack.grasp(force=0.2)
-    stack.probe.until(lambda: stack.bridge.at["finger_1"] > 0.001, "a motion")
+    stack.probe.until(lambda: stack.bridge.at["finger_1"] > OPEN + 5e-4, "a motion")
     assert goal.cancel()
     result = goal.result()
     assert goal.status == GoalStatus.STATUS_CANCELED
@@ -91,7 +92,7 @@ def test_cancelled_grasp_stops_and_keeps_its_place(stack):
     assert "cancelled" in result.message
     at = dict(stack.bridge.at)
     stack.probe.spin_for(0.5)
-    assert all(0.0 <= stack.bridge.at[name] - at[name] < 0.0012 for name in FINGERS)
+    assert all(-1e-5 <= stack.bridge.at[name] - at[name] < 0.0012 for name in FINGERS)
     assert stack.release(fast=True).result().released
 
 
@@ -107,8 +108,9 @@ def test_a_release_is_cancelled_before_it_begins(stack):
     assert not goal.cancel()  # it is over
 
 
+@pytest.mark.long
 def test_newer_goals_take_over_or_are_rejected_with_a_reason(stack):
-    stack = stack(close_speed=0.002).ready()
+    stack = stack(close_speed=0.001).ready()
     stack.show(BALL)
     first = stack.grasp(force=0.1)
     stack.probe.until(lambda: stack.now.state == "closing", "closing")
@@ -149,6 +151,7 @@ def test_bad_goals_are_rejected_with_a_reason(stack):
     assert stack.now.state == "idle"
 
 
+@pytest.mark.long
 def test_a_coordinator_that_starts_again_finds_what_it_holds(stack):
     stack = stack().holding()
     stack.end(stack.node)

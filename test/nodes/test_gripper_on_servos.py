@@ -8,14 +8,17 @@ from ccr_msgs.msg import ServoState
 from gripper_stack import BALL, FINGERS, GripperStack
 
 pytestmark = pytest.mark.long
-PATIENT = dict.fromkeys(("bridge_timeout", "solver_timeout", "stale_timeout"), 20.0)  # s
+SETTINGS = {
+    **dict.fromkeys(("bridge_timeout", "solver_timeout", "stale_timeout"), 20.0),  # s
+    **{f"{name}.open_pulls": [0.0] for name in FINGERS},  # where calibration ends
+}
 
 
 @pytest.fixture
 def chain(context, probe, start_bridge, servos):
     """The nodes, with calibrated servos."""
     bridge = start_bridge(rate=20.0)
-    stack = GripperStack(context, probe, bridge=bridge, close_speed=0.002, **PATIENT)
+    stack = GripperStack(context, probe, bridge=bridge, **SETTINGS)
     servos.in_state(ServoState.ACTIVE)
     assert servos.calibrate().success
     yield stack
