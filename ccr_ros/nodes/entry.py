@@ -52,6 +52,13 @@ def _run(module: str, node: str) -> int:
         for number in _SIGNALS:
             signal.signal(number, signal.default_int_handler)  # until rclpy.init brings its own
         return run(make, module)
+    except KeyboardInterrupt:
+        return 0
     except CcrError as error:
         print(f"{module}: error: {error}", file=sys.stderr)
         return 1
+    finally:
+        # A terminal and a launcher may both send one. Nothing is left to be ended, and Python,
+        # while it ends, would let a late one have the process and its exit code.
+        for number in _SIGNALS:
+            signal.signal(number, signal.SIG_IGN)
