@@ -79,6 +79,7 @@ class Person(RuleBasedStateMachine):
     @rule()
     def stop(self):
         self.gripper.stop()
+        self.letting = None  # whatever waited is off
         assert self.gripper.state in (State.STOPPED, State.FAULT)
         self.check()
 
@@ -86,6 +87,7 @@ class Person(RuleBasedStateMachine):
     def hold(self):
         with suppress(Refused):
             self.gripper.hold(self.plant.now)
+            self.letting = None
         self.check()
 
     @rule()
@@ -115,6 +117,22 @@ class Person(RuleBasedStateMachine):
         getattr(self.plant, what).add(name)
         self.wait(seconds)
         getattr(self.plant, what).clear()
+
+    @rule(how=st.sampled_from(["stop", "hold", "cancel"]))
+    def a_release_is_put_off(self, how):
+        self.release(0.5, True)
+        getattr(self, how)()
+        self.wait(1.0)
+
+    @rule()
+    def grasp_at_nothing(self):
+        """What was held is no more there, it seems: fingers that held must not open for that."""
+        self.stop()
+        self.reset()
+        self.plant.touch = dict.fromkeys(NAMES, 1.0)
+        self.wait(0.2)
+        self.grasp(0.2, [])
+        self.wait(2.5)
 
     @rule()
     def servo_fault(self):
