@@ -228,6 +228,7 @@ def run_bench(*flags):
 
 
 @pytest.mark.long
+@pytest.mark.timeout(600)
 def test_quick_bench_end_to_end():
     done = run_bench("--quick", "--json")
     assert done.returncode == 0, done.stderr
@@ -248,6 +249,9 @@ def test_quick_bench_end_to_end():
         elif row.group == "pulls":
             assert row.steps == row.converged == row.steps_wanted
             assert row.p99_ms >= row.p50_ms > 0
+        elif row.group == "routing":
+            assert row.p99_ms >= row.p50_ms > 0
+            assert f"{row.converged} of {row.samples} found" in row.note
         elif row.steps < row.steps_wanted:
             assert row.note.startswith(f"{row.steps} steps of {row.steps_wanted}, stopped at")
         else:
