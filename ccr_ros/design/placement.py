@@ -16,7 +16,7 @@ from .target import DesiredShape
 LENGTH_TOLERANCE = 1e-3  # of the finger's length: by so much a curve may be longer or shorter
 START_TOLERANCE = 1e-3  # of the finger's length: by so much it may start beside the base
 ANGLE_TOLERANCE = math.radians(1.0)  # by so much it may leave the base off +z
-_SAMPLES = 32  # per segment, for the tightest bend
+_SAMPLES = 32  # per segment, for the tightest bend and for where the curve meets itself
 
 
 def place(curve: Curve, finger: Finger) -> DesiredShape:
@@ -30,8 +30,9 @@ def place(curve: Curve, finger: Finger) -> DesiredShape:
 
     Raises:
         InvalidValue: The curve is not as long as the finger, within 0.1 %; does not start at the
-            base, within 0.1 % of the length; does not leave it along +z, within 1 degree; or is
-            bent so tightly that neighbouring disks would cut each other. Says by how much.
+            base, within 0.1 % of the length; does not leave it along +z, within 1 degree; is bent
+            so tightly that neighbouring disks would cut each other; or comes round and runs
+            through a disk. Says by how much.
     """
     what = f"curve {curve.name!r}"
     over = curve.length - finger.length
@@ -57,6 +58,7 @@ def place(curve: Curve, finger: Finger) -> DesiredShape:
             f"apart (they cut each other by {overlap[worst] * 1e3:.3g} mm: bend less tightly there,"
             " or take smaller or fewer disks)",
         )
+    _check_crossing(curve, points, tangents, finger, what)
     return DesiredShape(points, tangents=tangents)
 
 
@@ -92,3 +94,30 @@ def _check_bend(curve: Curve, finger: Finger, what: str) -> None:
             f" {1e3 / curvature[worst]:.4g} mm there, the disks, of {finger.disk_radius * 1e3:.4g}"
             " mm, would meet",
         )
+
+
+def _check_crossing(
+    curve: Curve, points: np.ndarray, tangents: np.ndarray, finger: Finger, what: str
+) -> None:
+    step = finger.segment_length
+    s = np.linspace(0.0, curve.length, _SAMPLES * finger.segments + 1)
+    backbone = curve.points(s) - curve.points(0.0)
+    for disk, (centre, axis) in enumerate(zip(points, tangents, strict=True)):
+        height = (backbone - centre) @ axis
+        through = np.flatnonzero((height[:-1] <= 0) != (height[1:] <= 0))
+        # The segments that end at this disk are `disk_overlap`'s and the bend's.
+        through = through[np.abs(s[through] - disk * step) > 1.5 * step]
+        if not len(through):
+            continue
+        part = height[through] / (height[through] - height[through + 1])
+        places = backbone[through] + part[:, None] * (backbone[through + 1] - backbone[through])
+        aside = np.linalg.norm(places - centre, axis=1)
+        nearest = int(np.argmin(aside))
+        if aside[nearest] < finger.disk_radius:
+            raise InvalidValue(
+                f"{what}: at {s[through[nearest]] * 1e3:.4g} mm",
+                places[nearest],
+                f"clear of the finger itself: it runs through disk {disk} there,"
+                f" {aside[nearest] * 1e3:.3g} mm from its centre; the disk's radius is"
+                f" {finger.disk_radius * 1e3:.4g} mm",
+            )

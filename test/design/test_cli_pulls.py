@@ -164,4 +164,6 @@ def test_bad_files_are_told_with_their_line(ccr, tmp_path, option, content, mess
 
 def test_finger_without_an_obstacle(ccr):
     code, _, err = ccr("straight", "--press", "7=1")
-    assert code == 2 and "--obstacle" in err
+    assert code == 2 and err == (
+        "ccr: error: --press: '7=1' is not allowed; must be of a finger whose file has obstacles\n"
+    )

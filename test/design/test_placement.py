@@ -88,3 +88,16 @@ def test_disks_that_would_cut_each_other():
         place(coil, finger)
     assert caught.value.place.startswith("curve 'helix of 5.5 turns, radius 4.9 mm': disks ")
     assert "they cut each other by" in str(caught.value)
+
+
+@pytest.mark.parametrize("angle", [1.0, 1.02, 1.19])
+def test_a_curve_that_comes_round_through_a_disk_is_refused(angle):
+    circle = np.linspace(0.0, 2 * math.pi * angle, 400)
+    radius = L / (2 * math.pi * angle)
+    curve = spline(radius * np.stack([1 - np.cos(circle), 0 * circle, np.sin(circle)], axis=1))
+    with pytest.raises(InvalidValue, match=r"runs through disk [019] there, .* mm from its centre"):
+        place(curve, FINGER)
+
+
+def test_a_curve_that_comes_round_beside_its_disks_is_not_refused():
+    assert place(helix(L, 0.02, 1.2), FINGER).segments == 9  # a turn rises by 92 mm

@@ -123,7 +123,9 @@ def _target(args: argparse.Namespace, finger: Finger) -> Target:
         raise InvalidValue("--press", args.press, "DISK=FORCE, such as 7=0.3")
     names = [obstacle.name for obstacle in finger.obstacles]
     if args.obstacle is None and len(names) != 1:
-        raise InvalidValue("--obstacle", None, f"given: one of {', '.join(names) or 'none'}")
+        if not names:
+            raise InvalidValue("--press", args.press, "of a finger whose file has obstacles")
+        raise InvalidValue("--obstacle", None, f"given: one of {', '.join(names)}")
     if args.obstacle is not None and args.obstacle not in names:
         raise UnknownName("obstacle", args.obstacle, names)
     return PressTarget(int(disk), args.obstacle or names[0], parse_number("--press", force))
