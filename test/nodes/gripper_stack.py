@@ -40,10 +40,10 @@ QUICK = {
     "force_gain": 0.003,
     "force_speed": 0.002,
     "settle_time": 0.15,
-    "bridge_timeout": 3.0,
-    "solver_timeout": 3.0,
-    "stale_timeout": 3.0,
-    "stall_time": 3.0,
+    "bridge_timeout": 15.0,
+    "solver_timeout": 15.0,
+    "stale_timeout": 15.0,
+    "stall_time": 10.0,
 }
 
 

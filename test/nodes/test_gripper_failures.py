@@ -7,6 +7,11 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from gripper_stack import BALL, FINGERS, OPEN
 from probe import sphere
 
+HOLDING = [
+    pytest.param(False, id="closing"),
+    pytest.param(True, id="holding", marks=pytest.mark.long),
+]
+
 
 def aborted(goal, text):
     """Wait for the goal to be aborted with this text; return the result."""
@@ -49,9 +54,9 @@ def test_something_else_is_touched(stack):
     assert result.state == "stopped"
 
 
-@pytest.mark.parametrize("holding", [False, True], ids=["closing", "holding"])
+@pytest.mark.parametrize("holding", HOLDING)
 def test_solver_silent(stack, holding):
-    stack = stack(solver_timeout=1.0, close_speed=0.001)
+    stack = stack(solver_timeout=3.0, close_speed=0.001)
     if holding:
         stack.holding()
     else:
@@ -70,7 +75,7 @@ def test_solver_silent(stack, holding):
     assert stack.release(fast=True).result().released
 
 
-@pytest.mark.parametrize("holding", [False, True], ids=["closing", "holding"])
+@pytest.mark.parametrize("holding", HOLDING)
 def test_servo_fault(stack, holding):
     stack = stack()
     if holding:
@@ -97,9 +102,9 @@ def test_servo_fault(stack, holding):
         assert stack.grasp(force=0.2).result().reached
 
 
-@pytest.mark.parametrize("holding", [False, True], ids=["closing", "holding"])
+@pytest.mark.parametrize("holding", HOLDING)
 def test_bridge_silent(stack, holding):
-    stack = stack(bridge_timeout=1.0, close_speed=0.001)
+    stack = stack(bridge_timeout=3.0, close_speed=0.001)
     if holding:
         stack.holding()
     else:
@@ -119,7 +124,7 @@ def test_bridge_silent(stack, holding):
 
 @pytest.mark.long
 def test_stale_pose(stack):
-    stack = stack(stale_timeout=1.0).holding()
+    stack = stack(stale_timeout=3.0).holding()
     last = stack.probe.until(lambda: stack.probe.states("finger_3"), "a state")[-1]
     stack.end(stack.solver)
     for name in FINGERS:
@@ -142,7 +147,7 @@ def test_timeout(stack):
 
 
 def test_a_servo_does_not_follow(stack):
-    stack = stack(stall_time=0.5, max_lead=0.001).ready()
+    stack = stack(stall_time=1.5, max_lead=0.001).ready()
     stack.bridge.stuck.add("finger_1")
     result = aborted(stack.grasp(), "finger_1: its servo does not follow")
     assert (result.state, result.stalled) == ("stopped", True)
