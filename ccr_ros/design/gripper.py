@@ -22,7 +22,7 @@ from ..model.rotation import Pose
 from ..model.solution import Solution
 from .contours import LeadIn, follow, lead_in, least_lead_in
 from .curves import Curve
-from .gripper_layout import GripperLayout, check_apart, check_facing
+from .gripper_layout import GripperLayout, check_above_bases, check_apart, check_facing
 from .placement import place
 from .press import Press
 from .pull import Pull
@@ -166,6 +166,7 @@ def design_gripper(task: GripperTask, name: str = "gripper") -> GripperDesign:
     ):
         shapes = [base.points(c) for base, c in zip(bases, centers, strict=True)]
         check_apart(shapes, template.disk_radius, when)
+        check_above_bases(shapes, template.disk_radius, when)
     mounted = tuple(
         MountedFinger(replace(d.finger, name=f"finger_{i}"), base)
         for i, (d, base) in enumerate(zip(designs, bases, strict=True), 1)

@@ -156,6 +156,31 @@ def check_apart(shapes: list[np.ndarray], disk_radius: float, when: str) -> None
             )
 
 
+def check_above_bases(shapes: list[np.ndarray], disk_radius: float, when: str) -> None:
+    """Check that fingers do not bend back down to what they stand on.
+
+    Args:
+        shapes: Disk centres (n+1, 3) of each finger in the gripper's frame [m].
+        disk_radius: So far above the bases' plane disks must stay, or as far as the first one is
+            if that is less [m].
+        when: Said in the error.
+
+    Raises:
+        InvalidValue: One does not; says which disk, and how low.
+    """
+    for i, shape in enumerate(shapes, 1):
+        height = shape[1:, 2]
+        disk = 1 + int(np.argmin(height))
+        least = min(disk_radius, float(height[0]))
+        if shape[disk, 2] < least or least <= 0:
+            raise InvalidValue(
+                f"finger {i}",
+                float(shape[disk, 2]),
+                f">= {least:.4g} m above the plane of the bases {when}: disk {disk} comes down to"
+                f" {shape[disk, 2] * 1e3:.3g} mm; take a smaller pull, or a higher object",
+            )
+
+
 def _base(azimuth: float, radius: float, aside: float) -> Pose:
     position = [
         radius * math.cos(azimuth) - aside * math.sin(azimuth),

@@ -11,7 +11,12 @@ import pytest
 from model.fingers import helical_cable, make_finger, straight_cable
 
 from ccr_ros.design.curve_text import SizedObject
-from ccr_ros.design.gripper_layout import GripperLayout, check_apart, check_facing
+from ccr_ros.design.gripper_layout import (
+    GripperLayout,
+    check_above_bases,
+    check_apart,
+    check_facing,
+)
 from ccr_ros.design.section import Section
 from ccr_ros.model import Box, Cylinder, InvalidValue, Sphere, load_gripper
 from ccr_ros.resources import find_config
@@ -130,3 +135,14 @@ def test_fingers_keep_apart():
     assert "apart at rest: disk 9 of one and disk 9 of the other come within 15 mm" in str(
         caught.value
     )
+
+
+def test_fingers_stay_above_their_bases():
+    up = np.linspace([0, 0, 0], [0, 0, 0.18], 10)
+    check_above_bases([up], 0.008, "now")
+    check_above_bases([np.linspace([0, 0, 0], [0, 0, 0.18], 61)], 0.008, "now")  # 3 mm segments
+    curled = up.copy()
+    curled[7, 2] = -0.014
+    with pytest.raises(InvalidValue, match=r"disk 7 comes down to -14 mm") as caught:
+        check_above_bases([up, curled], 0.008, "at rest")
+    assert caught.value.place == "finger 2"
