@@ -37,7 +37,7 @@ def text(numbers, factor=1.0):
 
 def test_tip_pose_as_json(ccr, wanted):
     tip = text([*wanted.tip.position, *wanted.tip.orientation])
-    code, out, err = ccr("two_cables", f"--tip={tip}", "--json")
+    code, out, err = ccr("two_cables", f"--tip={tip}", "--json", "--tolerance", "1e-4")
     assert (code, err) == (0, "")
     found = json.loads(out)
     assert found["reached"] and found["direct"] and found["message"] == ""
@@ -47,17 +47,27 @@ def test_tip_pose_as_json(ccr, wanted):
 
 
 def test_table_for_people_in_mm(ccr, wanted):
-    code, out, _ = ccr("two_cables", f"--tip={text(wanted.backbone[-1], 1e3)}", "--unit", "mm")
+    tip = f"--tip={text(wanted.backbone[-1], 1e3)}"
+    code, out, _ = ccr("two_cables", tip, "--unit", "mm", "--tolerance", "1e-4")
     assert code == 0
     assert "straight" in out and "4.000 mm" in out and "5.000 mm" in out
     assert "\n  reached, error " in out
+
+
+def test_a_tip_that_is_typed_in_counts_as_reached(ccr, wanted):
+    tip = ",".join(f"{v:.5f}" for v in wanted.backbone[-1])
+    assert ccr("two_cables", f"--tip={tip}")[0] == 0
+    code, out, _ = ccr("two_cables", f"--tip={tip}", "--tolerance", "1e-4")
+    assert code == 1 and "NOT REACHED" in out
 
 
 def test_points_file(ccr, wanted, tmp_path):
     path = tmp_path / "points.csv"
     rows = [f"{disk},{text(wanted.backbone[disk], 1e3)}" for disk in (3, 6, 9)]
     path.write_text("disk,x,y,z\n" + "\n".join(rows) + "\n")
-    code, out, _ = ccr("two_cables", "--points", path, "--unit", "mm", "--json")
+    code, out, _ = ccr(
+        "two_cables", "--points", path, "--unit", "mm", "--json", "--tolerance", "1e-4"
+    )
     assert code == 0
     assert list(json.loads(out)["pulls"].values()) == pytest.approx(PULLS, abs=1e-6)
 
@@ -78,7 +88,7 @@ def test_path_is_tracked_and_written(ccr, tmp_path):
     tips = [solver.solve([0.003 + 1e-4 * k, 0.003]).backbone[-1] for k in range(8)]
     path, out_path = tmp_path / "path.csv", tmp_path / "pulls.csv"
     path.write_text("\n".join(text(tip) for tip in tips))
-    code, out, _ = ccr("two_cables", "--path", path, "-o", out_path)
+    code, out, _ = ccr("two_cables", "--path", path, "-o", out_path, "--tolerance", "1e-4")
     assert code == 0 and "8 points, 8 reached" in out and f"written to {out_path}" in out
     with open(out_path, encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
@@ -127,6 +137,8 @@ def test_slack_is_as_told(ccr, wanted):
         (["--tip=0,0,0.1", "--min-pull", "main=1%"], "limits.low.main"),
         (["--tip=0,0,0.1", "--max-pull", "main=x"], "--max-pull main: 'x'"),
         (["--tip=0,0,0.1", "--max-pull", "main=1%", "--max-pull", "main=2%"], "once per cable"),
+        (["--tip=0,0,0.1", "--tolerance", "nan"], "--tolerance: 'nan'"),
+        (["--tip=0,0,0.1", "--tolerance", "0"], "--tolerance: '0'"),
         (["--press", "7"], "--press: '7'"),
         (["--press", "x=1"], "--press: 'x=1'"),
         (["--press", "99=1"], "press.disk"),

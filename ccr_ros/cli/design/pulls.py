@@ -11,7 +11,7 @@ FINGER is a finger file or the name of one in config/. Positions are in metres, 
 A slack cable is let out by 1 % of the finger's length. Out of reach, the nearest pose is told.
 Exit code: 0 reached, 1 not (with --path: not everywhere), 2 bad input.
 
-  ccr design pulls two_cables --tip=-0.004,0.022,0.178
+  ccr design pulls two_cables --tip=-0.001,0.03438,0.17727
   ccr design pulls contact_cylinder --press 7=0.3 --max-pull main=4% --plot press.png
   ccr design pulls two_cables --path circle.csv --unit mm -o pulls.csv
 """
@@ -26,6 +26,7 @@ from typing import Any
 import numpy as np
 
 from ccr_ros.cli.design.pulls_report import as_json, print_answer, print_path, write_path
+from ccr_ros.cli.options import number
 from ccr_ros.cli.solve import parse_pulls
 from ccr_ros.design.curve_files import UNITS
 from ccr_ros.design.pulls import PullPlanner, PullSolution
@@ -62,6 +63,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         ("--min-pull", "least pull of a cable, <= 0: main=-2%%, main=0"),
     ):
         parser.add_argument(option, metavar="CABLE=VALUE", action="append", default=[], help=text)
+    parser.add_argument(
+        "--tolerance",
+        metavar="MM",
+        default="0.01",
+        help="how far off a tip or a disk may be to count as reached [mm] (default 0.01)",
+    )
     parser.add_argument("--slack", metavar="M", help="how far slack cables are let out [m]")
     parser.add_argument("-o", "--output", metavar="FILE.csv", help="with --path: write the pulls")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
@@ -80,9 +87,13 @@ def run(args: argparse.Namespace) -> int:
     if args.output and not args.path:
         raise InvalidValue("--output", args.output, "given with --path only")
     finger = load_finger(find_config(args.finger))
+    millimetres = number("--tolerance", args.tolerance, 1e-6, 1e3)
+    # Forces have a tolerance of their own.
+    tolerance = 1e-6 if args.press else min(millimetres / 1e3 / finger.length, 1e-2)
     planner = PullPlanner(
         FingerSolver(finger),
         _limits(args, finger),
+        tolerance=tolerance,
         slack=None if args.slack is None else parse_number("--slack", args.slack),
     )
     targets = _path(args) if args.path else [_target(args, finger)]
