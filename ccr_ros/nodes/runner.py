@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from typing import Any
 
 import rclpy
@@ -66,6 +67,11 @@ def spin(make: NodeFactory, context: Context | None = None) -> None:
         end = getattr(node, "end", None)
         if end is not None:
             end()
+        # Here and now: what is left to the interpreter's end may outlive the middleware, which
+        # then crashes (Fast DDS did so now and then).
+        if node is not None:
+            with suppress(Exception):  # the context may be down, or going down
+                node.destroy_node()
 
 
 def _shut_down() -> None:

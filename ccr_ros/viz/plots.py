@@ -87,7 +87,7 @@ def draw_views(
     held += [b.vertices for b in bodies]
     points = np.vstack(held)
 
-    space = figure.add_subplot(cells[0], projection="3d", label="3-D", computed_zorder=False)
+    space: Any = figure.add_subplot(cells[0], projection="3d", label="3-D", computed_zorder=False)
     for body in bodies:
         draw_surface(space, body)
     _draw_pose(space, solution, rest, (0, 1, 2), arrows)

@@ -110,7 +110,7 @@ class Reader(Generator):
         self, ftype: FieldType, target: str, count: str, end: str, code: str, leaves: list
     ) -> None:
         if ftype.is_numeric and ftype.kind == "array":
-            native = np.dtype(NUMPY_TYPES[ftype.base])
+            native: Any = np.dtype(NUMPY_TYPES[ftype.base])
             name = native.name
             self.scope[f"N_{name}"] = native
             self.scope[f"T_{name}"] = native.newbyteorder(self.endian)

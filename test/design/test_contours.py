@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from scipy.integrate import trapezoid
 
 from ccr_ros.design.contours import contour, lead_in, least_lead_in
 from ccr_ros.design.section import Section
@@ -84,7 +85,7 @@ def test_the_join_can_be_chosen_and_the_least_bending_one_bends_least():
     # The bending that it states is that of the curve.
     s = np.linspace(0, lead.length, 4001)
     squares = chosen.curvatures(s) ** 2
-    assert lead.bending == pytest.approx(np.trapezoid(squares, s), rel=1e-6)
+    assert lead.bending == pytest.approx(trapezoid(squares, s), rel=1e-6)
 
 
 @settings(deadline=None, max_examples=12)
