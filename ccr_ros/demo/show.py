@@ -25,6 +25,7 @@ from .scene import BALL, GRIP_FORCE, HEAVY, LIGHT
 
 _READY_TIMEOUT = 30.0  # s until all nodes are there
 _ANSWER_TIMEOUT = 10.0  # s for an answer that needs no motion
+_REFUSALS, _AGAIN = 10.0, 0.3  # s for which a goal that is refused is sent again, and how often
 _CALIBRATION_TIMEOUT = 60.0  # s
 _GRASP_TIMEOUT = 40.0  # s
 _RELEASE_DELAY = 3.0  # s; the paper's gripper lets go at a set time
@@ -154,10 +155,16 @@ class Show:
         return future.result()
 
     def _act(self, client: Any, goal: Any, limit: float, what: str) -> Generator[None, None, Any]:
-        handle = yield from self._answer(client.send_goal_async(goal), _ANSWER_TIMEOUT, what)
-        if not handle.accepted:
-            why = self.gripper.refusal if self.gripper is not None else ""
-            raise StackFailed(f"the coordinator refused to {what}{f': {why}' if why else ''}")
+        end = time.monotonic() + _REFUSALS
+        while True:
+            handle = yield from self._answer(client.send_goal_async(goal), _ANSWER_TIMEOUT, what)
+            if handle.accepted:
+                break
+            # The coordinator may not have heard yet what this node has: that the servos are ready.
+            if time.monotonic() > end:
+                why = self.gripper.refusal if self.gripper is not None else ""
+                raise StackFailed(f"the coordinator refused to {what}{f': {why}' if why else ''}")
+            yield from self._nap(_AGAIN)
         answer = yield from self._answer(handle.get_result_async(), limit, what)
         if answer.status not in (GoalStatus.STATUS_SUCCEEDED, GoalStatus.STATUS_ABORTED):
             raise StackFailed(f"{what} was canceled: {answer.result.message}")
