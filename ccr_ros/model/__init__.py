@@ -14,7 +14,16 @@ if TYPE_CHECKING:
     from .errors import CcrError, InvalidFile, InvalidValue, NotConverged, UnknownName
     from .files import Gripper, MountedFinger, finger_from_dict, load_finger, load_gripper
     from .finger import Cable, Finger
-    from .obstacles import Box, Cylinder, Obstacle, Plane, Sphere
+    from .obstacles import (
+        Box,
+        Capsule,
+        ConvexMesh,
+        Cylinder,
+        FiniteCylinder,
+        Obstacle,
+        Plane,
+        Sphere,
+    )
     from .rotation import Pose
     from .sensitivity import Sensitivity
     from .settings import SolverSettings
@@ -24,12 +33,15 @@ if TYPE_CHECKING:
 __all__ = [
     "Box",
     "Cable",
+    "Capsule",
     "CcrError",
     "Certificate",
     "Contact",
+    "ConvexMesh",
     "Cylinder",
     "Finger",
     "FingerSolver",
+    "FiniteCylinder",
     "Gripper",
     "InvalidFile",
     "InvalidValue",

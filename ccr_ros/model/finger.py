@@ -149,7 +149,7 @@ class Finger:
             raise InvalidValue("obstacles", self.obstacles, "a list of obstacles")
         for i, obstacle in enumerate(self.obstacles):
             if not isinstance(obstacle, Obstacle):
-                allowed = "an obstacle (Sphere, Cylinder, Box or Plane)"
+                allowed = "an obstacle (Sphere, Box, Cylinder, ConvexMesh, ...)"
                 raise InvalidValue(f"obstacles[{i}]", obstacle, allowed)
             self.check_clear_of_base(obstacle, f"obstacles[{i}]")
         return tuple(self.obstacles)

@@ -6,7 +6,18 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from ccr_ros.model import Box, Cylinder, FingerSolver, InvalidValue, Plane, Pose, Sphere
+from ccr_ros.model import (
+    Box,
+    Capsule,
+    ConvexMesh,
+    Cylinder,
+    FingerSolver,
+    FiniteCylinder,
+    InvalidValue,
+    Plane,
+    Pose,
+    Sphere,
+)
 
 from .fingers import make_finger
 
@@ -26,7 +37,11 @@ SPHERE = Sphere([0.1, -0.2, 0.3], 0.4)
 CYLINDER = Cylinder([0.1, 0.2, 0.3], [1, 2, -1], 0.3)
 PLANE = Plane([0.1, 0.2, 0.3], [1, -1, 2])
 BOX = Box([0.1, -0.1, 0.2], [0.6, 0.8, 1.0], TURN, 0.15)
-ALL = [SPHERE, CYLINDER, PLANE, BOX]
+CAPSULE = Capsule([0.1, -0.2, -0.1], [0.3, 0.2, 0.3], 0.25)
+CAN = FiniteCylinder([0.1, -0.1, 0.2], [1, 2, -1], 0.6, 0.4, 0.1)
+WEDGE = [[0, 0, 0], [0.9, 0, 0], [0, 0.8, 0], [0.7, 0.6, 0.1], [0.1, 0.2, 0.9], [0.5, 0.2, 0.8]]
+MESH = ConvexMesh.hull_of(WEDGE, edge_radius=0.05).moved(Pose([-0.4, -0.3, -0.2], TURN))
+ALL = [SPHERE, CYLINDER, PLANE, BOX, CAPSULE, CAN, MESH]
 by_type = pytest.mark.parametrize("obstacle", ALL, ids=lambda o: type(o).__name__)
 
 
@@ -53,7 +68,16 @@ def smooth_at(obstacle, point):
             return False
         ordered = np.sort(excess)
         return bool(ordered[-1] > 0.02 or (ordered[-1] < 0 and ordered[-1] - ordered[-2] > 1e-3))
-    return True
+    # Where pieces of a surface meet, or tie for the nearest, normal or Hessian jump.
+    around = point + 1e-4 * np.vstack([np.eye(3), -np.eye(3), np.zeros((1, 3))])
+    normals, hessians = obstacle.derivatives(around)
+    step = np.abs(hessians - hessians[-1]).max()
+    return bool(np.abs(normals - normals[-1]).max() < 0.02 and step < 0.05 and within(hessians[-1]))
+
+
+def within(hessian):
+    """Tell whether differences of 1e-5 can follow a curvature."""
+    return np.abs(hessian).max() < 50
 
 
 @pytest.mark.parametrize(
@@ -80,6 +104,20 @@ def smooth_at(obstacle, point):
         # A quarter turn about z swaps x and y.
         (Box([0, 0, 0], [2, 4, 6], [0, 0, 0.5**0.5, 0.5**0.5]), [3, 0, 0], 1.0),
         (Box([0, 0, 0], [2, 2, 2], edge_radius=1), [2, 2, 2], np.sqrt(12) - 1),  # a ball
+        # Round at its ends, as a cylinder between them.
+        (Capsule([0, 0, -1], [0, 0, 1], 0.5), [2, 0, 0.9], 1.5),
+        (Capsule([0, 0, -1], [0, 0, 1], 0.5), [0, 0, 3], 1.5),
+        (Capsule([0, 0, -1], [0, 0, 1], 0.5), [3, 0, -5], 4.5),
+        (Capsule([0, 0, -1], [0, 0, 1], 0.5), [0, 0, 0.3], -0.5),
+        # Side and ends of a cylinder stay where they are, whatever the rounding.
+        (FiniteCylinder([0, 0, 1], [0, 0, 5], 4, 2), [0, 3, 1.5], 1.0),
+        (FiniteCylinder([0, 0, 1], [0, 0, 5], 4, 2), [1.5, 0.5, 4], 1.0),
+        (FiniteCylinder([0, 0, 1], [0, 0, 5], 4, 2), [1.5, 0, -1], 0.0),
+        (FiniteCylinder([0, 0, 1], [0, 0, 5], 4, 2), [0.3, 0, -0.5], -0.5),
+        (FiniteCylinder([0, 0, 1], [0, 0, 5], 4, 2), [0, -1.9, 1], -0.1),
+        (FiniteCylinder([0, 0, 0], [1, 0, 0], 4, 2, 0.5), [2, 2, 0], (np.sqrt(2) - 1) * 0.5),
+        (FiniteCylinder([0, 0, 0], [1, 0, 0], 4, 2, 0.5), [-4.5, 0, 4.5], np.hypot(3, 3) - 0.5),
+        (FiniteCylinder([0, 0, 0], [1, 0, 0], 4, 2, 0.5), [0, 0, 0], -2.0),
     ],
 )
 def test_known_distances(obstacle, point, expected):
@@ -202,7 +240,41 @@ def test_normals_of_a_box_turn_smoothly_around_an_edge():
     np.testing.assert_allclose(normals[-1], [0, 1, 0], atol=1e-12)
 
 
+def test_normals_of_a_cylinder_turn_smoothly_around_its_edge():
+    can = FiniteCylinder([0, 0, 0], [0, 0, 1], 2, 1, 0.1)
+    angles = np.linspace(0, np.pi / 2, 200)
+    path = np.column_stack([0.9 + 0.1 * np.cos(angles), 0 * angles, 0.9 + 0.1 * np.sin(angles)])
+    path = np.vstack([[1, 0, 0.8], path, [0.8, 0, 1]])
+    normals, _ = can.derivatives(path)
+    np.testing.assert_allclose(can.signed_distance(path), 0, atol=1e-12)
+    assert np.linalg.norm(np.diff(normals, axis=0), axis=1).max() < 0.01
+    np.testing.assert_allclose(normals[0], [1, 0, 0], atol=1e-12)
+    np.testing.assert_allclose(normals[-1], [0, 0, 1], atol=1e-12)
+
+
+@deterministic
+@given(point=points)
+def test_a_long_cylinder_is_an_infinite_one_and_a_short_capsule_a_ball(point):
+    long = FiniteCylinder(CYLINDER.point, CYLINDER.axis, 100.0, CYLINDER.radius)
+    assume(np.linalg.norm(np.cross(point - CYLINDER.point, CYLINDER.axis)) > 0.02)
+    assert distance(long, point) == pytest.approx(distance(CYLINDER, point), abs=1e-12)
+    for one, other in zip(
+        normal_and_hessian(long, point), normal_and_hessian(CYLINDER, point), strict=True
+    ):
+        np.testing.assert_allclose(one, other, atol=1e-9)
+    short = Capsule(SPHERE.center, SPHERE.center + 1e-9 * np.eye(3)[2], SPHERE.radius)
+    assert distance(short, point) == pytest.approx(distance(SPHERE, point), abs=1e-8)
+
+
+def test_a_capsule_knows_its_axis():
+    assert CAPSULE.length == pytest.approx(0.6)
+    np.testing.assert_allclose(CAPSULE.center, [0.2, 0, 0.1], atol=1e-12)
+    np.testing.assert_allclose(CAPSULE.axis, np.array([0.2, 0.4, 0.4]) / 0.6, atol=1e-12)
+
+
 def test_default_rounding_is_small():
+    assert FiniteCylinder([0, 0, 0], [0, 0, 1], 0.1, 0.2).edge_radius == 0.001
+    assert FiniteCylinder([0, 0, 0], [0, 0, 1], 0.01, 0.2).edge_radius == pytest.approx(0.0005)
     assert Box([0, 0, 0], [0.1, 0.2, 0.3]).edge_radius == 0.001
     assert Box([0, 0, 0], [0.01, 0.2, 0.3]).edge_radius == pytest.approx(0.0005)
 
@@ -214,6 +286,10 @@ def test_default_rounding_is_small():
         (Cylinder([0, 0, 0.1], [0, 3, 0], 0.01), [0, 0.2, 0.1]),
         (Cylinder([0, 0, 0.1], [1, 1, 1], 0.01), [0.2, 0.2, 0.3]),
         (Box([0, 0, 0.1], [1, 1, 1]), [0, 0, 0.1]),
+        (Capsule([0, 0, 0], [1, 1, 1], 0.01), [0.2, 0.2, 0.2]),
+        (Capsule([0, 0, 0], [1, 1, 1], 0.01), [0, 0, 0]),
+        (FiniteCylinder([0, 0, 0.1], [1, 1, 1], 1, 0.4), [0.2, 0.2, 0.3]),
+        (FiniteCylinder([0, 0, 0.1], [1, 1, 1], 0.1, 0.4), [0.01, 0.01, 0.11]),
     ],
 )
 def test_at_its_centre_an_obstacle_still_has_a_normal(obstacle, point):
@@ -243,6 +319,16 @@ def test_a_finger_leaves_an_obstacle_that_appears_centred_on_a_disk():
         (lambda: Box([0, 0, 0], [1, 1, 0]), "size[2]"),
         (lambda: Box([0, 0, 0], [1, 1, 1], [0, 0, 0, 2]), "orientation"),
         (lambda: Box([0, 0, 0], [1, 1, 1], edge_radius=0.6), "edge_radius"),
+        (lambda: Capsule([0, 0], [0, 0, 1], 1), "start"),
+        (lambda: Capsule([0, 0, 0], [0, 0, np.inf], 1), "end[2]"),
+        (lambda: Capsule([0, 0, 1], [0, 0, 1], 1), "end"),
+        (lambda: Capsule([0, 0, 0], [0, 0, 1], 0), "radius"),
+        (lambda: FiniteCylinder([0, 0, np.nan], [0, 0, 1], 1, 1), "center[2]"),
+        (lambda: FiniteCylinder([0, 0, 0], [0, 0, 0], 1, 1), "axis"),
+        (lambda: FiniteCylinder([0, 0, 0], [0, 0, 1], 0, 1), "height"),
+        (lambda: FiniteCylinder([0, 0, 0], [0, 0, 1], 1, -1), "radius"),
+        (lambda: FiniteCylinder([0, 0, 0], [0, 0, 1], 2, 1, 1), "edge_radius"),
+        (lambda: FiniteCylinder([0, 0, 0], [0, 0, 1], 2, 1, 0), "edge_radius"),
     ],
 )
 def test_bad_values_are_refused(make, place):
@@ -257,6 +343,13 @@ def test_nearly_unit_quaternions_are_made_unit():
 
 
 def test_values_are_frozen():
-    for array in (SPHERE.center, CYLINDER.axis, PLANE.normal, BOX.size, BOX.orientation):
+    for array in (
+        SPHERE.center,
+        CYLINDER.axis,
+        PLANE.normal,
+        BOX.size,
+        BOX.orientation,
+        MESH.vertices,
+    ):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 9

@@ -1,63 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Obstacles as smooth signed distances, positive outside, with gradient and Hessian.
-
-The paper's Eq. 6 asks for a function f(x) >= 0 outside the obstacle. A signed distance is the
-one whose multiplier is the contact's normal force, because its gradient is the unit normal.
-"""
+"""Balls, infinite cylinders, half-spaces and boxes."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, replace
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 
-from . import checks
-from .rotation import Pose, matrix_from_quaternion, quaternion_from_matrix
-
-_FAR = 1e6  # m; beyond, rounding errors of a distance would exceed the solver's tolerance
-_TINY = 1e-12  # m; where a normal is undefined (a sphere's centre), any unit vector serves
-
-
-@dataclass(frozen=True, eq=False)
-class Obstacle(ABC):
-    """A rigid body that disks and cables may touch but not enter, in the finger's base frame."""
-
-    name: str = field(default="obstacle", kw_only=True)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "name", str(self.name))
-
-    def _set(self, **values: Any) -> None:
-        for key, value in values.items():
-            object.__setattr__(self, key, value)
-
-    @abstractmethod
-    def signed_distance(self, points: np.ndarray) -> np.ndarray:
-        """Return the distance (P,) in metres of points (P, 3); positive outside."""
-
-    @abstractmethod
-    def derivatives(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return outward unit normals (P, 3) and Hessians (P, 3, 3) [1/m] at points (P, 3)."""
-
-    @abstractmethod
-    def moved(self, pose: Pose) -> Obstacle:
-        """Return the obstacle carried by a rigid motion, given as the pose of its frame."""
-
-
-def _radial(offset: np.ndarray, span: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Normal and Hessian of |offset|, offset (P, 3) living in the subspace projected on by span."""
-    r = np.linalg.norm(offset, axis=1)
-    central = r < _TINY
-    r = np.maximum(r, _TINY)
-    normal = offset / r[:, None]
-    hessian = (span - normal[:, :, None] * normal[:, None, :]) / r[:, None, None]
-    if central.any():
-        any_way = span[np.argmax(np.diagonal(span))]
-        normal[central] = any_way / np.linalg.norm(any_way)
-        hessian[central] = 0.0
-    return normal, hessian
+from .. import checks
+from ..rotation import Pose, matrix_from_quaternion, quaternion_from_matrix
+from .base import FAR, TINY, Obstacle, default_edge_radius, radial
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,15 +23,15 @@ class Sphere(Obstacle):
     def __post_init__(self) -> None:
         super().__post_init__()
         self._set(
-            center=checks.vector("center", self.center, 3, unit="m", largest=_FAR),
-            radius=checks.real("radius", self.radius, above=0, high=_FAR, unit="m"),
+            center=checks.vector("center", self.center, 3, unit="m", largest=FAR),
+            radius=checks.real("radius", self.radius, above=0, high=FAR, unit="m"),
         )
 
     def signed_distance(self, points: np.ndarray) -> np.ndarray:
         return np.linalg.norm(points - self.center, axis=1) - self.radius
 
     def derivatives(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return _radial(points - self.center, np.eye(3))
+        return radial(points - self.center, np.eye(3))
 
     def moved(self, pose: Pose) -> Sphere:
         return replace(self, center=pose.points(self.center))
@@ -95,9 +48,9 @@ class Cylinder(Obstacle):
     def __post_init__(self) -> None:
         super().__post_init__()
         self._set(
-            point=checks.vector("point", self.point, 3, unit="m", largest=_FAR),
+            point=checks.vector("point", self.point, 3, unit="m", largest=FAR),
             axis=checks.direction("axis", self.axis),
-            radius=checks.real("radius", self.radius, above=0, high=_FAR, unit="m"),
+            radius=checks.real("radius", self.radius, above=0, high=FAR, unit="m"),
         )
 
     def _across(self) -> np.ndarray:
@@ -108,7 +61,7 @@ class Cylinder(Obstacle):
 
     def derivatives(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         across = self._across()
-        return _radial((points - self.point) @ across, across)
+        return radial((points - self.point) @ across, across)
 
     def moved(self, pose: Pose) -> Cylinder:
         return replace(self, point=pose.points(self.point), axis=pose.vectors(self.axis))
@@ -124,7 +77,7 @@ class Plane(Obstacle):
     def __post_init__(self) -> None:
         super().__post_init__()
         self._set(
-            point=checks.vector("point", self.point, 3, unit="m", largest=_FAR),
+            point=checks.vector("point", self.point, 3, unit="m", largest=FAR),
             normal=checks.direction("normal", self.normal),
         )
 
@@ -153,13 +106,13 @@ class Box(Obstacle):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        size = checks.vector("size", self.size, 3, unit="m", largest=_FAR)
+        size = checks.vector("size", self.size, 3, unit="m", largest=FAR)
         for i, side in enumerate(size):
             checks.real(f"size[{i}]", float(side), above=0, unit="m")
         shortest = float(size.min())
-        edge = min(0.05 * shortest, 0.001) if self.edge_radius is None else self.edge_radius
+        edge = default_edge_radius(shortest) if self.edge_radius is None else self.edge_radius
         self._set(
-            center=checks.vector("center", self.center, 3, unit="m", largest=_FAR),
+            center=checks.vector("center", self.center, 3, unit="m", largest=FAR),
             size=size,
             orientation=checks.quaternion("orientation", self.orientation),
             edge_radius=checks.real("edge_radius", edge, above=0, high=shortest / 2, unit="m"),
@@ -186,12 +139,12 @@ class Box(Obstacle):
         sign = np.where(local < 0, -1.0, 1.0)
         clipped = np.maximum(excess, 0.0)
         r = np.linalg.norm(clipped, axis=1)
-        deep = r < _TINY  # in the core: the nearest face decides
+        deep = r < TINY  # in the core: the nearest face decides
         face = np.eye(3)[np.argmax(excess, axis=1)]
-        normal = np.where(deep[:, None], face, clipped / np.maximum(r, _TINY)[:, None])
+        normal = np.where(deep[:, None], face, clipped / np.maximum(r, TINY)[:, None])
         active = (excess > 0).astype(float)
         hessian = active[:, :, None] * np.eye(3) - normal[:, :, None] * normal[:, None, :]
-        hessian *= np.where(deep, 0.0, 1.0 / np.maximum(r, _TINY))[:, None, None]
+        hessian *= np.where(deep, 0.0, 1.0 / np.maximum(r, TINY))[:, None, None]
         hessian *= sign[:, :, None] * sign[:, None, :]
         return (sign * normal) @ rotation.T, rotation @ hessian @ rotation.T
 
