@@ -1,8 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Fingers and the object they hold in one equilibrium, free of ROS (docs/grasp_statics.md)."""
 
-from .body import Body, sphere_body
+from .body import Body, box_body, capsule_body, cylinder_body, mesh_body, sphere_body
 from .result import GraspSolution, ObjectContact
 from .solver import GraspSolver
 
-__all__ = ["Body", "GraspSolution", "GraspSolver", "ObjectContact", "sphere_body"]
+__all__ = [
+    "Body",
+    "GraspSolution",
+    "GraspSolver",
+    "ObjectContact",
+    "box_body",
+    "capsule_body",
+    "cylinder_body",
+    "mesh_body",
+    "sphere_body",
+]
