@@ -299,8 +299,11 @@ class EquilibriumProblem:
         normals: np.ndarray,
         curvatures: np.ndarray,
         forces: np.ndarray,
+        pushes: np.ndarray | None = None,
     ) -> np.ndarray:
         """Hessian (N, N) of the Lagrangian, for tensions (C,) and contact forces (c,) on pairs.
+
+        ``pushes`` (P, 3) are further forces on the points, which keep their directions: friction.
 
         The second derivative of a sum of functions of points splits into the functions' own
         curvature on the Jacobians and the points' curvature on the functions' gradients.
@@ -308,6 +311,8 @@ class EquilibriumProblem:
         tension = tensions[self._span_group]
         # of the constraints' part of the Lagrangian, with respect to the points
         gradient = self._incidence.T @ (tension[:, None] * at.spans)
+        if pushes is not None:
+            gradient -= pushes
 
         scale = np.sqrt(np.maximum(tension, 0.0) / np.maximum(at.span_lengths, 1e-12))
         across = first.spans - at.spans[:, :, None] * first.stretch[:, None, :]

@@ -21,13 +21,16 @@ import numpy as np
 _LARGEST = 1e8
 
 
-def solve_multipliers(s: np.ndarray, t: np.ndarray, active: np.ndarray) -> np.ndarray | None:
+def solve_multipliers(
+    s: np.ndarray, t: np.ndarray, active: np.ndarray, symmetric: bool = True
+) -> np.ndarray | None:
     """Return the multipliers m >= 0 with S m + t >= 0 and m'(S m + t) = 0, or None if infeasible.
 
     Args:
         s: (c, c) Gram matrix of the constraints, positive semidefinite.
         t: (c,) their residuals at the unconstrained minimum; negative where violated.
         active: (c,) bool, a guess at which multipliers are positive.
+        symmetric: Whether S is; with sliding friction it is not, and there is no QP behind it.
     """
     count = len(t)
     if count == 0:
@@ -35,6 +38,11 @@ def solve_multipliers(s: np.ndarray, t: np.ndarray, active: np.ndarray) -> np.nd
     guess = _held(s, t, active)
     if guess is not None:
         return guess
+    if not symmetric:
+        found = _pivoted(s, t, active)
+        if found is not None:
+            return found
+        s = 0.5 * (s + s.T)  # near enough to go on from
     unit = 1.0 / np.sqrt(np.maximum(np.diag(s), 1e-300))
     # Twin or redundant points make S singular; the shift gives the least multipliers among equals.
     scaled = s * unit[:, None] * unit[None, :] + 1e-11 * np.eye(count)
@@ -66,6 +74,33 @@ def _daqp(size: int) -> ca.Function:
     return ca.conic(
         f"multipliers_{size}", "daqp", {"h": ca.Sparsity.diag(size), "a": dense}, options
     )
+
+
+def _pivoted(s: np.ndarray, t: np.ndarray, active: np.ndarray) -> np.ndarray | None:
+    """Multipliers by principal pivots (Murty's least index, worst first while that gets on)."""
+    count = len(t)
+    inside = active.copy()
+    tolerance = 1e-12 * max(1.0, float(np.abs(t).max()))
+    for turn in range(4 * count + 4):
+        index = np.flatnonzero(inside)
+        multipliers = np.zeros(count)
+        if len(index):
+            block = s[index[:, None], index] + 1e-12 * np.diag(np.abs(np.diag(s))[index])
+            try:
+                multipliers[index] = np.linalg.solve(block, -t[index])
+            except np.linalg.LinAlgError:
+                return None
+        slack = s @ multipliers + t
+        wrong = np.where(inside, multipliers, slack)
+        wrong[~inside & (slack > -tolerance)] = 0.0
+        if wrong.min() >= 0:
+            return multipliers if float(multipliers.max()) < _LARGEST else None
+        bad = np.flatnonzero(wrong < 0)
+        unit = np.sqrt(np.maximum(np.diag(s), 1e-300))
+        size = np.where(inside, wrong * unit, wrong / unit)  # alike in units
+        change = int(np.argmin(size)) if turn < 2 * count else int(bad[0])
+        inside[change] = not inside[change]
+    return None
 
 
 def _held(s: np.ndarray, t: np.ndarray, active: np.ndarray) -> np.ndarray | None:

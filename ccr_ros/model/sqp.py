@@ -115,9 +115,16 @@ def solve_sqp(
 
 
 def derive(
-    problem: EquilibriumProblem, at: Evaluation, tensions: np.ndarray, forces: np.ndarray
+    problem: EquilibriumProblem,
+    at: Evaluation,
+    tensions: np.ndarray,
+    forces: np.ndarray,
+    pushes: np.ndarray | None = None,
 ) -> KktPoint:
-    """Return the KKT point of a pose with multipliers: all derivatives and the residual."""
+    """Return the KKT point of a pose with multipliers: all derivatives and the residual.
+
+    ``pushes`` (P, 3), if any, are in the Hessian and not in the residual.
+    """
     first = problem.linearize(at)
     pairs = _candidates(problem, at, forces)
     normals, curvatures, pressing = _NO_NORMALS, _NO_CURVATURES, _NO_FORCES
@@ -129,7 +136,7 @@ def derive(
         rows = np.concatenate([rows, contact])
         values = np.concatenate([values, -at.distances[index]])
         multipliers = np.concatenate([tensions, pressing])
-    hessian = problem.hessian(at, first, tensions, pairs, normals, curvatures, pressing)
+    hessian = problem.hessian(at, first, tensions, pairs, normals, curvatures, pressing, pushes)
     unbalanced = np.abs(at.y + multipliers @ rows).max()
     residual = float(unbalanced / max(1.0, np.abs(at.y).max()))
     return KktPoint(

@@ -8,7 +8,7 @@ import pytest
 
 from ccr_ros.grasp.statics import Body, GraspSolver, sphere_body
 from ccr_ros.grasp.statics.assembly import block, gather
-from ccr_ros.grasp.statics.solver import _displaced
+from ccr_ros.grasp.statics.path import displaced
 from ccr_ros.model import (
     Box,
     InvalidValue,
@@ -166,7 +166,7 @@ def test_a_box_pressed_and_turned_has_the_derivatives_that_differences_give(fing
     tension = np.array([1.7])
 
     def gradient(dy, dq):
-        part = block(hand, 0, body, _displaced(pose, dq, hand.length), y + dy, tension, forces)
+        part = block(hand, 0, body, displaced(pose, dq, hand.length), y + dy, tension, forces)
         found = {int(k): i for i, k in enumerate(part.point.pairs[:, 1])}
         rows = [0, *(1 + found[int(k)] for k in near)]
         force = np.concatenate([tension, forces[0, near]])
@@ -190,7 +190,7 @@ def test_a_box_pressed_and_turned_has_the_derivatives_that_differences_give(fing
     force = np.concatenate([tension, forces[0, near]])
 
     def energy(dq):
-        moved = body.shape.moved(hand.in_base(0, _displaced(pose, dq, hand.length)))
+        moved = body.shape.moved(hand.in_base(0, displaced(pose, dq, hand.length)))
         distance = moved.signed_distance(part.point.at.points[near] * problem.finger.length)
         return -float(force[1:] @ distance) / problem.finger.length
 

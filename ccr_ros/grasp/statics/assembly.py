@@ -16,7 +16,8 @@ distance to second order by
     n.(v - w x r) - n.(w x v) + 1/2 n.(w x (w x r)) + 1/2 u'H u,      u = v - w x r
 
 which gives rows and Hessian blocks below: each contact joins one finger and the object, so the
-matrix is block diagonal but for the object's border.
+matrix is block diagonal but for the object's border. Friction adds forces on the same points along
+the surface (`friction`), to which the same formulas apply with H = 0.
 """
 
 from __future__ import annotations
@@ -33,6 +34,7 @@ from ccr_ros.model.settings import SolverSettings
 from ccr_ros.model.sqp import KktPoint, derive
 
 from .body import Body
+from .friction import FrictionRows, Hold, friction_rows, pushes_in_base
 
 _EYE = np.eye(3)
 
@@ -60,6 +62,12 @@ class Hand:
         )
         self._turns = [m.base.rotation for m in fingers]
         self._bases = [m.base for m in fingers]
+        self._frames = []
+        for mounted, turn in zip(self.mounted, self._turns, strict=True):
+            frame = np.zeros((6, 6))
+            frame[:3, :3] = turn.T * (self.length / mounted.finger.length)
+            frame[3:, 3:] = turn.T
+            self._frames.append(frame)
 
     def in_base(self, index: int, pose: Pose) -> Pose:
         """Return a pose of the gripper's frame in the base frame of a finger."""
@@ -67,9 +75,9 @@ class Hand:
         position = (pose.position - base.position) @ turn
         return Pose(position, quaternion_from_matrix(turn.T @ pose.rotation))
 
-    def turn(self, index: int) -> np.ndarray:
-        """Return the rotation matrix (3, 3) of a finger's base in the gripper."""
-        return self._turns[index]
+    def frame(self, index: int) -> np.ndarray:
+        """Return (6, 6) from a motion q to that in a finger's base frame and units."""
+        return self._frames[index]
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +90,10 @@ class FingerBlock:
         columns: (C + c, 6) of all rows with respect to q.
         border: (N, 6) of the Hessian, finger against q.
         corner: (6, 6) the finger's share of the Hessian of q.
+        hold: What friction remembers, with the forces that it has here.
+        friction: The contacts that have it.
+        place: The object in the finger's base frame.
+        unbalanced: (N,) generalised forces left over.
     """
 
     point: KktPoint
@@ -89,6 +101,15 @@ class FingerBlock:
     columns: np.ndarray
     border: np.ndarray
     corner: np.ndarray
+    hold: Hold
+    friction: FrictionRows
+    place: Pose
+    unbalanced: np.ndarray
+
+    def on_object(self) -> np.ndarray:
+        """(6,) force and moment that the finger leaves over on the object, in its own units."""
+        total = self.point.multipliers @ self.columns
+        return total + np.einsum("gi,gij->j", self.friction.forces, self.friction.columns)
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,6 +139,7 @@ def block(
     y: np.ndarray,
     tensions: np.ndarray,
     forces: np.ndarray,
+    hold: Hold | None = None,
 ) -> FingerBlock:
     """Return one finger's part, at coordinates y (N,), with multipliers in its own units.
 
@@ -129,21 +151,22 @@ def block(
         y: The finger's coordinates.
         tensions: (C,) multipliers of its cable lengths.
         forces: (O, P) multipliers of its contacts; the last row is the object's.
+        hold: What friction remembers of it, with its forces; None: nothing.
     """
     problem = hand.problems[index]
     local = hand.in_base(index, pose)
     own = problem.finger.obstacles
     problem.obstacles = (*own, body.shape.moved(local))
-    point = derive(problem, problem.evaluate(y), tensions, forces)
+    hold = Hold.none(len(problem.points.labels)) if hold is None else hold
+    pushes = pushes_in_base(hold, local.rotation, forces[-1]) if body.friction > 0 else None
+    point = derive(problem, problem.evaluate(y), tensions, forces, pushes)
     lengths = len(point.tensions)
     at_object = np.flatnonzero(point.pairs[:, 0] == len(own)) if len(point.pairs) else np.empty(0)
     touch = at_object.astype(int)
     columns = np.zeros((len(point.rows), 6))
     border, corner = np.zeros((problem.size, 6)), np.zeros((6, 6))
+    frame = hand.frame(index)
     if len(touch):
-        scale = hand.length / problem.finger.length
-        frame = np.zeros((6, 6))  # q in the base frame and in the finger's units
-        frame[:3, :3], frame[3:, 3:] = hand.turn(index).T * scale, hand.turn(index).T
         where = point.pairs[touch, 1]
         arms = point.at.points[where] - local.position / problem.finger.length
         normals = point.normals[touch]
@@ -152,9 +175,40 @@ def block(
         pressed = np.flatnonzero(point.multipliers[lengths + touch] > 0)
         if len(pressed):
             force = point.multipliers[lengths + touch[pressed]]
-            _second_order(problem, point, where[pressed], arms[pressed], force, border, corner)
+            whole = force[:, None] * normals[pressed]
+            if pushes is not None:
+                whole = whole + pushes[where[pressed]]
+            _second_order(
+                problem, point, where[pressed], arms[pressed], force, whole, border, corner
+            )
             border, corner = border @ frame, frame.T @ corner @ frame
-    return FingerBlock(point, lengths + touch, columns, border, corner)
+    parts = (point, lengths + touch, columns, border, corner)
+    return _with_friction(hand, index, body, parts, hold, local)
+
+
+def held_anew(hand: Hand, index: int, body: Body, part: FingerBlock, hold: Hold) -> FingerBlock:
+    """Return a finger's part where friction remembers something else and forces are the same."""
+    parts = (part.point, part.touch, part.columns, part.border, part.corner)
+    return _with_friction(hand, index, body, parts, hold, part.place)
+
+
+def _with_friction(
+    hand: Hand,
+    index: int,
+    body: Body,
+    parts: tuple[KktPoint, np.ndarray, np.ndarray, np.ndarray, np.ndarray],
+    hold: Hold,
+    place: Pose,
+) -> FingerBlock:
+    point, touch = parts[:2]
+    centre = place.position / hand.problems[index].finger.length
+    rows = friction_rows(
+        point, touch, hold, body.friction, centre, place.rotation, hand.frame(index)
+    )
+    unbalanced = point.at.y + point.multipliers @ point.rows
+    if len(rows):
+        unbalanced = unbalanced + np.einsum("gi,gin->n", rows.forces, rows.rows)
+    return FingerBlock(*parts, hold, rows, place, unbalanced)
 
 
 def _second_order(
@@ -163,36 +217,48 @@ def _second_order(
     where: np.ndarray,
     arms: np.ndarray,
     force: np.ndarray,
+    whole: np.ndarray,
     border: np.ndarray,
     corner: np.ndarray,
 ) -> None:
-    """Add the second derivatives of -force x distance to border and corner, base frame."""
-    normals, hessians = problem.obstacles[-1].derivatives(
-        point.at.points[where] * problem.finger.length
-    )
-    hessians = hessians * problem.finger.length
+    """Add the second derivatives of -force x distance to border and corner, base frame.
+
+    ``whole`` (k, 3) are the contacts' forces on the finger, friction included.
+    """
+    _, hessians = problem.obstacles[-1].derivatives(point.at.points[where] * problem.finger.length)
+    hessians = hessians * (problem.finger.length * force)[:, None, None]
     motion = np.concatenate([np.tile(-_EYE, (len(arms), 1, 1)), skew(arms)], axis=2)  # u by q
     bent = hessians @ motion
     by_point = bent.copy()
-    by_point[:, :, 3:] -= skew(normals)
+    by_point[:, :, 3:] -= skew(whole)
     jacobian = point.first.points[where]
-    border -= np.einsum("k,kin,kij->nj", force, jacobian, by_point)
-    corner -= np.einsum("k,kai,kaj->ij", force, motion, bent)
-    turned = np.einsum("k,kij->ij", force, skew(normals))
+    border -= np.einsum("kin,kij->nj", jacobian, by_point)
+    corner -= np.einsum("kai,kaj->ij", motion, bent)
+    turned = skew(whole).sum(axis=0)
     corner[:3, 3:] -= turned
     corner[3:, :3] -= turned.T
-    outer = np.einsum("k,ki,kj->ij", force, normals, arms)
+    outer = np.einsum("ki,kj->ij", whole, arms)
     corner[3:, 3:] -= 0.5 * (outer + outer.T) - np.trace(outer) * _EYE
 
 
-def gather(hand: Hand, pose: Pose, blocks: Sequence[FingerBlock], load: np.ndarray) -> GraspPoint:
-    """Put the blocks together and say how far from equilibrium all is."""
+def gather(
+    hand: Hand, pose: Pose, blocks: Sequence[FingerBlock], load: np.ndarray, free: bool = True
+) -> GraspPoint:
+    """Put the blocks together and say how far from equilibrium all is.
+
+    Args:
+        hand: The fingers.
+        pose: Of the object in the gripper.
+        blocks: One per finger.
+        load: (6,) on the object, in units.
+        free: Whether the object is; else its support balances it.
+    """
     unbalanced = -load
     worst, largest = 0.0, 1.0
     for weight, part in zip(hand.weights, blocks, strict=True):
-        point = part.point
-        unbalanced = unbalanced + weight * (point.multipliers @ part.columns)
-        worst = max(worst, point.residual * max(1.0, float(np.abs(point.at.y).max())))
-        largest = max(largest, float(np.abs(point.at.y).max()))
-    residual = max(worst, float(np.abs(unbalanced).max())) / largest
-    return GraspPoint(pose, tuple(blocks), load, unbalanced, residual)
+        unbalanced = unbalanced + weight * part.on_object()
+        worst = max(worst, float(np.abs(part.unbalanced).max()), part.friction.error())
+        largest = max(largest, float(np.abs(part.point.at.y).max()))
+    if free:
+        worst = max(worst, float(np.abs(unbalanced).max()))
+    return GraspPoint(pose, tuple(blocks), load, unbalanced, worst / largest)

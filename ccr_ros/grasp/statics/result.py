@@ -3,37 +3,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import math
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ccr_ros.model.errors import NotConverged
 from ccr_ros.model.result import make_solution, row_space
 from ccr_ros.model.solution import Solution
-from ccr_ros.model.sqp import KktPoint
+from ccr_ros.model.sqp import ACTIVE, KktPoint
 
-from .assembly import GraspPoint, Hand
+from .assembly import FingerBlock, GraspPoint, Hand
 from .body import Body
+from .path import Way
 
 _STABLE = 1e-6
 _AXES = "xyz"
-
-
-@dataclass
-class Way:
-    """How far a solve came.
-
-    Attributes:
-        point: Where it stands; pulls: per finger [m], there.
-        reached: None once the target is reached; else the share of the way that was, in [0, 1).
-        iterations: Newton steps; substeps: continuation steps accepted.
-    """
-
-    point: GraspPoint
-    pulls: list[np.ndarray]
-    reached: float | None = None
-    iterations: int = 0
-    substeps: int = 0
 
 
 @dataclass
@@ -60,6 +45,11 @@ class ObjectContact:
         position: (3,) [m].
         normal: (3,) out of the object.
         force: [N] normal, on the finger along ``normal``; the object feels the opposite.
+        friction_force: (3,) [N] along the surface, on the finger.
+        status: ``"stick"``, ``"slip"`` or ``"frictionless"``: without friction, or only just
+            touching.
+        margin: 1 - |friction_force| / (friction * force): 0 where it slips, nan without friction.
+        slid: (3,) [m] way of the finger on the object in this solve.
     """
 
     finger: str
@@ -69,6 +59,10 @@ class ObjectContact:
     position: np.ndarray
     normal: np.ndarray
     force: float
+    friction_force: np.ndarray
+    status: str
+    margin: float
+    slid: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,6 +85,7 @@ class GraspSolution:
         residual: Largest unbalanced generalised force, relative to the largest elastic one.
         iterations, substeps: Newton and continuation steps.
         solve_time: Wall-clock [s].
+        dissipated: Energy that friction gave off in this solve [J].
         message: What is wrong, and what to do; empty if nothing is.
     """
 
@@ -108,7 +103,19 @@ class GraspSolution:
     iterations: int
     substeps: int
     solve_time: float
+    dissipated: float = 0.0
     message: str = field(default="")
+
+    @property
+    def margin(self) -> float:
+        """Smallest margin of the contacts; nan where none has friction."""
+        margins = [c.margin for c in self.contacts if not math.isnan(c.margin)]
+        return min(margins, default=math.nan)
+
+    @property
+    def energy(self) -> float:
+        """Elastic energy of all fingers [J]."""
+        return sum(finger.energy for finger in self.fingers)
 
     def require_converged(self) -> GraspSolution:
         """Return self.
@@ -135,7 +142,7 @@ def make_grasp_solution(
         make_solution(
             problem,
             wanted,
-            _FingerWay(part.point, pulls, way.reached, way.iterations, way.substeps),
+            _FingerWay(_own_point(part), pulls, way.reached, way.iterations, way.substeps),
             elapsed=lambda: elapsed,
         )
         for problem, part, pulls, wanted in zip(
@@ -151,7 +158,7 @@ def make_grasp_solution(
         fingers=fingers,
         body=body,
         supported=supported,
-        contacts=_contacts(hand, body, fingers),
+        contacts=_contacts(hand, body, way),
         net_force=net[:3],
         net_moment=net[3:],
         converged=way.reached is None,
@@ -162,6 +169,7 @@ def make_grasp_solution(
         iterations=way.iterations,
         substeps=way.substeps,
         solve_time=elapsed,
+        dissipated=way.heat,
         message=_message(way, stable, softest),
     )
 
@@ -180,9 +188,11 @@ def softest_direction(
         matrix[own, -6:] = weight * part.border
         matrix[-6:, own] = matrix[own, -6:].T
         matrix[-6:, -6:] += weight * part.corner
-        active = part.point.active
-        full = np.zeros((int(active.sum()), total))
-        full[:, own], full[:, -6:] = part.point.rows[active], part.columns[active]
+        active, sticks = part.point.active, ~part.friction.slips
+        by_y = [part.point.rows[active], *part.friction.rows[sticks]]
+        by_q = [part.columns[active], *part.friction.columns[sticks]]
+        full = np.zeros((sum(map(len, by_y)), total))
+        full[:, own], full[:, -6:] = np.concatenate(by_y), np.concatenate(by_q)
         rows.append(full)
         first += size
     # Neither what the support holds nor what changes nothing is a direction to fall in.
@@ -220,21 +230,49 @@ def _in_words(hand: Hand, at: GraspPoint, direction: np.ndarray, supported: bool
     return max(shares)[1]
 
 
-def _contacts(hand: Hand, body: Body, fingers: tuple[Solution, ...]) -> tuple[ObjectContact, ...]:
-    return tuple(
-        ObjectContact(
-            finger=mounted.finger.name,
-            disk=contact.disk,
-            point=contact.point,
-            cable=contact.cable,
-            position=mounted.base.points(contact.position),
-            normal=mounted.base.vectors(contact.normal),
-            force=contact.force,
-        )
-        for mounted, solution in zip(hand.mounted, fingers, strict=True)
-        for contact in solution.contacts
-        if contact.obstacle == body.name
-    )
+def _own_point(part: FingerBlock) -> KktPoint:
+    """A finger's point with the residual that it has under friction."""
+    worst = float(np.abs(part.unbalanced).max())
+    return replace(part.point, residual=worst / max(1.0, float(np.abs(part.point.at.y).max())))
+
+
+def _contacts(hand: Hand, body: Body, way: Way) -> tuple[ObjectContact, ...]:
+    found = []
+    for index, (part, mounted) in enumerate(zip(way.point.blocks, hand.mounted, strict=True)):
+        problem, point, friction = hand.problems[index], part.point, part.friction
+        length = problem.finger.length
+        unit = problem.finger.bending_stiffness / length**2
+        turn = part.place.rotation
+        rubbing = {int(row): k for k, row in enumerate(friction.index)}
+        for row in part.touch[point.multipliers[part.touch] > ACTIVE]:
+            where = int(point.pairs[row - len(point.tensions), 1])
+            label = problem.points.labels[where]
+            along, status, margin = np.zeros(3), "frictionless", math.nan
+            if body.friction > 0:
+                status, margin = "stick", 1.0  # one that only just touches has no friction yet
+            k = rubbing.get(int(row))
+            if k is not None:
+                along = friction.forces[k] @ friction.tangents[k]
+                size = float(np.linalg.norm(along))
+                margin = max(0.0, 1.0 - size / float(friction.limits[k]))
+                status = "slip" if part.hold.slipping[where] else "stick"
+            slid = way.slid[index][where] if way.slid else np.zeros(3)
+            found.append(
+                ObjectContact(
+                    finger=mounted.finger.name,
+                    disk=label.disk,
+                    point=label.point,
+                    cable=label.cable,
+                    position=mounted.base.points(point.at.points[where] * length),
+                    normal=mounted.base.vectors(point.normals[row - len(point.tensions)]),
+                    force=float(point.multipliers[row]) * unit,
+                    friction_force=mounted.base.vectors(along * unit),
+                    status=status,
+                    margin=margin,
+                    slid=mounted.base.vectors(turn @ slid),
+                )
+            )
+    return tuple(sorted(found, key=lambda c: (c.finger, c.disk, c.point, c.cable)))
 
 
 def _message(way: Way, stable: bool, softest: str) -> str:

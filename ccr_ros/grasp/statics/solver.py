@@ -1,33 +1,40 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The warm solver of fingers and object: continuation in pulls and loads around Newton's method."""
+"""The warm solver of fingers and object together."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ccr_ros.model import checks
 from ccr_ros.model.errors import InvalidValue, UnknownName
 from ccr_ros.model.files import MountedFinger
-from ccr_ros.model.result import meeting_disks
-from ccr_ros.model.rotation import Pose, quaternion_from_matrix, skew
+from ccr_ros.model.rotation import Pose
 from ccr_ros.model.settings import SolverSettings
-from ccr_ros.model.solver import FingerSolver
-from ccr_ros.model.sqp import Bounds, violation
+from ccr_ros.model.solver import FingerSolver, Standing
 
 from .assembly import GraspPoint, Hand, block, gather
 from .body import GRAVITY, Body
-from .newton import Step, newton_step
-from .result import GraspSolution, Way, make_grasp_solution
-
-_SMALLEST_STEP = 1.0 / 256
-_LARGEST_TURN = 0.5  # rad in one arc, or of the object, in one Newton step
-_LARGEST_SHIFT = 0.05  # of the length, of the object in one Newton step
+from .path import Path, Way
+from .result import GraspSolution, make_grasp_solution
 
 Pulls = Mapping[str, Sequence[float] | np.ndarray]
+
+
+@dataclass(frozen=True, eq=False)
+class GraspStanding:
+    """Where a `GraspSolver` stands (see `GraspSolver.standing`); nothing in it ever changes."""
+
+    hand: Hand
+    body: Body
+    supported: bool
+    outer: np.ndarray
+    pulls: tuple[np.ndarray, ...]
+    point: GraspPoint | None
+    pressed: tuple[Standing, ...]
 
 
 class GraspSolver:
@@ -35,13 +42,17 @@ class GraspSolver:
 
     The object starts supported: it stands still at its pose, whatever presses on it. `let_go`
     takes the support away; from then on the fingers alone hold it against its weight and other
-    loads. Fingers and contacts have no friction. Not for use by several threads at once.
+    loads. Where the body has friction, contacts stick until their force leaves the Coulomb cone and
+    then slip; the result depends on the path, which is walked in small steps. Not for use by
+    several threads at once.
 
     Args:
         fingers: The fingers and their bases.
         body: The object at its first pose.
         settings: Of the fingers' discretisation, and tolerances.
         gravity: (3,) [m/s^2] in the gripper's frame; default: the gripper points up.
+        friction_step: Largest change of a pull in one step while something touches, as a share of
+            the finger's length, where there is friction.
 
     Raises:
         InvalidValue: No finger, fingers whose stiffness is not known beside others, or a body
@@ -54,6 +65,7 @@ class GraspSolver:
         body: Body,
         settings: SolverSettings | None = None,
         gravity: np.ndarray = GRAVITY,
+        friction_step: float = 0.0025,
     ) -> None:
         if not fingers:
             raise InvalidValue("fingers", fingers, "at least one finger")
@@ -66,10 +78,10 @@ class GraspSolver:
         self.settings = self.hand.problems[0].settings
         self.body = body
         self.gravity = checks.vector("gravity", gravity, 3, unit="m/s^2", largest=1e3)
+        self.friction_step = checks.real("friction_step", friction_step, above=0, high=1)
         self.supported = True
         self._outer = np.zeros(6)
         self._pulls = [np.zeros(len(m.finger.cables)) for m in fingers]
-        self._support = np.zeros(6)
         self._point: GraspPoint | None = None
         self._started = [FingerSolver(m.finger, settings) for m in fingers]
 
@@ -77,6 +89,16 @@ class GraspSolver:
     def names(self) -> tuple[str, ...]:
         """Names of the fingers."""
         return tuple(m.finger.name for m in self.hand.mounted)
+
+    @property
+    def pulls(self) -> dict[str, np.ndarray]:
+        """Pulls [m] of each finger's cables, of the last pose."""
+        return {n: p.copy() for n, p in zip(self.names, self._pulls, strict=True)}
+
+    @property
+    def point(self) -> GraspPoint | None:
+        """The last pose that converged, with all derivatives; None before the first."""
+        return self._point
 
     def solve(
         self,
@@ -107,11 +129,14 @@ class GraspSolver:
             outer[:3] = checks.vector("force", force, 3, unit="N", largest=1e6)
         if moment is not None:
             outer[3:] = checks.vector("moment", moment, 3, unit="N m", largest=1e6)
-        if self.supported or self._point is None:
-            way = self._press(target)
+        load = self._load(body, outer)
+        rough = self.body.friction > 0
+        if self.supported and not rough:
+            way = self._press(target, load)
         else:
-            way = Way(self._point, self._pulls)
-            self._walk(way, target, self._load(self.body, self._outer), self._load(body, outer))
+            way = self._press(self._pulls, load) if self._point is None else self._way()
+            if way.reached is None:
+                self._path().walk(way, target, load)
         if way.reached is None:
             self._accept(way.point, target)
             self.body, self._outer = replace(body, pose=way.point.pose), outer
@@ -131,11 +156,12 @@ class GraspSolver:
         begin = time.perf_counter()
         if self._point is None:
             raise InvalidValue("let_go", None, "called after a solve")
-        way = Way(self._point, self._pulls)
-        load = self._load(self.body, self._outer)
+        way = self._way()
         if self.supported:
-            carried = self._point.unbalanced + self._point.load
-            self._walk(way, self._pulls, carried, load)
+            load = self._point.load
+            carried = self._point.unbalanced + load
+            way.point = gather(self.hand, self.body.pose, self._point.blocks, carried)
+            self._path(free=True).walk(way, self._pulls, load)
         if way.reached is None:
             self.supported = False
             self._accept(way.point, self._pulls)
@@ -145,14 +171,51 @@ class GraspSolver:
         )
 
     def support(self, pose: Pose | None = None) -> None:
-        """Hold the object from now on where it is, or at another pose."""
-        self.supported = True
+        """Hold the object from now on where it is, or at another pose.
+
+        Put at another pose the object has no friction with what touches it there until that moves.
+        """
         if pose is not None:
             self.body = replace(self.body, pose=pose)
-        for index, solver in enumerate(self._started):
-            local = self.hand.in_base(index, self.body.pose)
-            solver.obstacles = (*self.hand.mounted[index].finger.obstacles,
-                                self.body.shape.moved(local))  # fmt: skip
+            self._point = None
+        if self.body.friction > 0 and self._point is not None:
+            load, blocks = self._point.load, self._point.blocks
+            self._point = gather(self.hand, self.body.pose, blocks, load, free=False)
+        else:
+            self._put()
+        self.supported = True
+
+    @property
+    def standing(self) -> GraspStanding:
+        """Where the solver stands; a solver of the same fingers can `resume` from it."""
+        return GraspStanding(
+            self.hand,
+            self.body,
+            self.supported,
+            self._outer,
+            tuple(self._pulls),
+            self._point,
+            tuple(solver.standing for solver in self._started),
+        )
+
+    def resume(self, standing: GraspStanding) -> None:
+        """Go back, or over, to where a solver of the same fingers and settings stood.
+
+        Raises:
+            InvalidValue: It is of other fingers, or discretised otherwise.
+        """
+        same = len(standing.hand.mounted) == len(self.hand.mounted) and all(
+            a.finger is b.finger and a.base is b.base
+            for a, b in zip(standing.hand.mounted, self.hand.mounted, strict=True)
+        )
+        if not same:
+            names = ", ".join(m.finger.name for m in standing.hand.mounted)
+            raise InvalidValue("standing", names, f"of a solver of {', '.join(self.names)}")
+        for solver, stood in zip(self._started, standing.pressed, strict=True):
+            solver.resume(stood)
+        self.body, self.supported = standing.body, standing.supported
+        self._outer, self._point = standing.outer, standing.point
+        self._pulls = list(standing.pulls)
 
     # -- inside ----------------------------------------------------------------------------
 
@@ -181,10 +244,25 @@ class GraspSolver:
         wrench[:3] += body.mass * self.gravity
         return wrench * np.array([self.hand.length] * 3 + [1.0] * 3) / self.hand.energy
 
-    def _press(self, target: list[np.ndarray]) -> Way:
+    def _path(self, free: bool | None = None) -> Path:
+        free = not self.supported if free is None else free
+        return Path(self.hand, self.body, self.settings, self.friction_step, free)
+
+    def _way(self) -> Way:
+        assert self._point is not None
+        return Way(self._point, self._pulls)
+
+    def _put(self) -> None:
+        """Put the object among the obstacles of each finger by itself."""
+        for index, solver in enumerate(self._started):
+            local = self.hand.in_base(index, self.body.pose)
+            solver.obstacles = (*self.hand.mounted[index].finger.obstacles,
+                                self.body.shape.moved(local))  # fmt: skip
+
+    def _press(self, target: list[np.ndarray], load: np.ndarray) -> Way:
         """Solve each finger by itself against the object, which its support holds."""
         if self._point is None:
-            self.support()
+            self._put()
         parts, reached, iterations = [], None, 0
         for index, solver in enumerate(self._started):
             found = solver.solve(target[index])
@@ -196,94 +274,10 @@ class GraspSolver:
                 block(self.hand, index, self.body, self.body.pose, point.at.y, point.tensions,
                       point.forces)
             )  # fmt: skip
-        load = self._load(self.body, self._outer)
-        way = Way(gather(self.hand, self.body.pose, parts, load), target)
+        start = gather(self.hand, self.body.pose, parts, load, free=False)
+        way = Way(self._path().settled(start), target)
         way.reached, way.iterations = reached, iterations
         return way
 
     def _accept(self, point: GraspPoint, pulls: list[np.ndarray]) -> None:
         self._point, self._pulls = point, [p.copy() for p in pulls]
-
-    def _walk(
-        self, way: Way, target: list[np.ndarray], load: np.ndarray, last_load: np.ndarray
-    ) -> None:
-        """Walk from a point under pulls and load to others, in steps that Newton can follow."""
-        start = [p.copy() for p in way.pulls]
-        change = max(
-            float(np.abs(a - b).max()) / m.finger.length
-            for a, b, m in zip(target, start, self.hand.mounted, strict=True)
-        )
-        done, size = 0.0, min(1.0, self.settings.max_pull_step / change if change > 0 else 1.0)
-        deadline = time.thread_time() + self.settings.time_limit
-        while done < 1.0:
-            share = 1.0 if done + size > 1.0 - 1e-9 else done + size
-            pulls = [a + share * (b - a) for a, b in zip(start, target, strict=True)]
-            found = self._newton(way, pulls, load + share * (last_load - load), deadline)
-            if found is None:
-                size *= 0.5
-                if size < _SMALLEST_STEP or time.thread_time() > deadline:
-                    way.reached = done
-                    return
-                continue
-            way.point, way.pulls, done = found, pulls, share
-            way.substeps += 1
-            size *= 2.0
-
-    def _newton(
-        self, way: Way, pulls: list[np.ndarray], load: np.ndarray, deadline: float
-    ) -> GraspPoint | None:
-        """Solve for the equilibrium near a point; None if it is not found."""
-        hand, tolerance = self.hand, self.settings.tolerance
-        at = replace(way.point, load=load)
-        at = gather(hand, at.pose, at.blocks, load)
-        bounds = [
-            Bounds(p.length_bounds(u), np.zeros((len(p.obstacles), len(p.points.labels))))
-            for p, u in zip(hand.problems, pulls, strict=True)
-        ]
-        for _ in range(self.settings.max_iterations):
-            over = max(
-                violation(part.point, part.point.slacks(bound))
-                for part, bound in zip(at.blocks, bounds, strict=True)
-            )
-            if at.residual <= tolerance and over <= tolerance:
-                pairs = zip(hand.problems, at.blocks, strict=True)
-                return None if any(meeting_disks(p, part.point) for p, part in pairs) else at
-            if time.thread_time() > deadline:
-                return None
-            step = newton_step(hand, at, bounds)
-            if step is None:
-                return None
-            way.iterations += 1
-            at = self._moved(at, step)
-        return None
-
-    def _moved(self, at: GraspPoint, step: Step) -> GraspPoint:
-        hand = self.hand
-        turn = max(
-            float(np.abs(part).max()) * problem.largest_scale
-            for part, problem in zip(step.fingers, hand.problems, strict=True)
-        )
-        turn = max(turn, float(np.linalg.norm(step.body[3:])))
-        shift = float(np.linalg.norm(step.body[:3]))
-        size = min(1.0, _LARGEST_TURN / max(turn, 1e-12), _LARGEST_SHIFT / max(shift, 1e-12))
-        pose = _displaced(at.pose, size * step.body, hand.length)
-        parts = []
-        for index, part in enumerate(at.blocks):
-            point = part.point
-            multipliers = step.multipliers[index]
-            count = len(point.tensions)
-            forces = np.zeros_like(point.forces)
-            if len(point.pairs):
-                forces[point.pairs[:, 0], point.pairs[:, 1]] = multipliers[count:]
-            y = point.at.y + size * step.fingers[index]
-            parts.append(block(hand, index, self.body, pose, y, multipliers[:count], forces))
-        return gather(hand, pose, parts, at.load)
-
-
-def _displaced(pose: Pose, motion: np.ndarray, length: float) -> Pose:
-    """The pose after a motion (translation in lengths, rotation vector) about its centre."""
-    angle = float(np.linalg.norm(motion[3:]))
-    axis = motion[3:] / angle if angle > 0 else np.array([0.0, 0.0, 1.0])
-    k = skew(axis)
-    turn = np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * (k @ k)
-    return Pose(pose.position + length * motion[:3], quaternion_from_matrix(turn @ pose.rotation))

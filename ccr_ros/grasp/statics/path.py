@@ -1,0 +1,220 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Continuation of fingers and object in pulls and loads, around Newton's method."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ccr_ros.model.result import meeting_disks
+from ccr_ros.model.rotation import Pose, quaternion_from_matrix, skew
+from ccr_ros.model.settings import SolverSettings
+from ccr_ros.model.sqp import ACTIVE, Bounds, violation
+
+from .assembly import FingerBlock, GraspPoint, Hand, block, gather, held_anew
+from .body import Body
+from .friction import settle
+from .newton import Step, newton_step
+
+_SMALLEST_STEP = 1.0 / 256
+_LARGEST_TURN = 0.5  # rad in one arc, or of the object, in one Newton step
+_LARGEST_SHIFT = 0.05  # of the length, of the object in one Newton step
+_LOAD_STEP = 0.1  # of the forces that press on the object, where there is friction
+
+
+@dataclass
+class Way:
+    """How far a solve came.
+
+    Attributes:
+        point: Where it stands; pulls: per finger [m], there.
+        reached: None once the target is reached; else the share of the way that was, in [0, 1).
+        iterations: Newton steps; substeps: continuation steps accepted.
+        slid: Per finger (P, 3), way of its points on the object, in the object's frame [m].
+        heat: Energy that friction has given off [J].
+        late: The time limit ended it.
+    """
+
+    point: GraspPoint
+    pulls: list[np.ndarray]
+    reached: float | None = None
+    iterations: int = 0
+    substeps: int = 0
+    slid: list[np.ndarray] = field(default_factory=list)
+    heat: float = 0.0
+    late: bool = False
+
+
+class Path:
+    """Walks from equilibrium to equilibrium.
+
+    Args:
+        hand: The fingers.
+        body: The object, for its shape and friction.
+        settings: Tolerances and limits.
+        friction_step: Largest change of a pull in one step while contacts have friction, as a
+            share of the finger's length.
+        free: Whether the object is; else its support holds it where it is.
+    """
+
+    def __init__(
+        self,
+        hand: Hand,
+        body: Body,
+        settings: SolverSettings,
+        friction_step: float,
+        free: bool,
+    ) -> None:
+        self.hand = hand
+        self.body = body
+        self.settings = settings
+        self.friction_step = friction_step
+        self.free = free
+        self._deadline = np.inf
+
+    def walk(self, way: Way, target: list[np.ndarray], load: np.ndarray) -> None:
+        """Walk from where ``way`` stands to other pulls [m] and another load (6,), in units."""
+        rough = self.body.friction > 0
+        start, begin_load = [p.copy() for p in way.pulls], way.point.load
+        way.slid = way.slid or [np.zeros((len(p.points.labels), 3)) for p in self.hand.problems]
+        change = max(
+            float(np.abs(a - b).max()) / m.finger.length
+            for a, b, m in zip(target, start, self.hand.mounted, strict=True)
+        )
+        fine = min(1.0, self.friction_step / change) if change > 0 else 1.0
+        size = min(1.0, self.settings.max_pull_step / change) if change > 0 else 1.0
+        if rough:
+            grip = sum(float(w * p.point.forces[-1].sum()) for w, p in self._blocks(way.point))
+            heavier = float(np.linalg.norm(load - begin_load))
+            fine = min(fine, _LOAD_STEP * max(grip, 1e-6) / max(heavier, 1e-12))
+            fine = max(fine, _SMALLEST_STEP)
+        done, smallest = 0.0, min(_SMALLEST_STEP, fine / 16 if rough else 1.0)
+        self._deadline = time.thread_time() + self.settings.time_limit
+        while done < 1.0:
+            if rough and self._touches(way.point):
+                size = min(size, fine)
+            share = 1.0 if done + size > 1.0 - 1e-9 else done + size
+            pulls = [a + share * (b - a) for a, b in zip(start, target, strict=True)]
+            next_load = begin_load + share * (load - begin_load)
+            found = self._newton(way, way.point, pulls, next_load)
+            if found is None and any(p.hold.slipping.any() for p in way.point.blocks):
+                # That what slips slips on was a guess, which may leave nothing to hold the object.
+                found = self._newton(way, self._sticking(way.point), pulls, next_load)
+            # What comes to touch has no friction in the step in which it does.
+            skipped = found is not None and rough and size > 2 * fine and self._touches(found)
+            if found is None or skipped:
+                size *= 0.5
+                way.late = time.thread_time() > self._deadline
+                if size < smallest or way.late:
+                    way.reached = done
+                    return
+                continue
+            way.point, way.pulls, done = self._settled(way, found), pulls, share
+            way.substeps += 1
+            size *= 2.0
+
+    def settled(self, point: GraspPoint) -> GraspPoint:
+        """Return a point whose contacts are anchored where they are, without friction yet."""
+        nowhere = Way(point, [], slid=[np.zeros((len(p.points.labels), 3))
+                                       for p in self.hand.problems])  # fmt: skip
+        return self._settled(nowhere, point)
+
+    def _blocks(self, at: GraspPoint) -> Sequence[tuple[float, FingerBlock]]:
+        return list(zip(self.hand.weights, at.blocks, strict=True))
+
+    def _touches(self, at: GraspPoint) -> bool:
+        return any(bool((part.point.forces[-1] > ACTIVE).any()) for part in at.blocks)
+
+    def _settled(self, way: Way, found: GraspPoint) -> GraspPoint:
+        """The point with friction's memory brought up to date, and what slipped told to ``way``."""
+        if self.body.friction <= 0:
+            return found
+        parts = []
+        for index, part in enumerate(found.blocks):
+            length = self.hand.problems[index].finger.length
+            hold, slip = settle(
+                part.point,
+                part.touch,
+                part.friction,
+                way.point.blocks[index].hold,
+                part.place.position / length,
+                part.place.rotation,
+            )
+            way.slid[index] = way.slid[index] + slip.ways * length
+            way.heat += slip.heat * float(self.hand.weights[index]) * self.hand.energy
+            parts.append(held_anew(self.hand, index, self.body, part, hold))
+        return replace(found, blocks=tuple(parts))
+
+    def _sticking(self, at: GraspPoint) -> GraspPoint:
+        parts = []
+        for index, part in enumerate(at.blocks):
+            hold = replace(part.hold, slipping=np.zeros_like(part.hold.slipping))
+            parts.append(held_anew(self.hand, index, self.body, part, hold))
+        return replace(at, blocks=tuple(parts))
+
+    def _newton(
+        self, way: Way, start: GraspPoint, pulls: list[np.ndarray], load: np.ndarray
+    ) -> GraspPoint | None:
+        """Solve for the equilibrium near a point; None if it is not found."""
+        hand, tolerance = self.hand, self.settings.tolerance
+        at = gather(hand, start.pose, start.blocks, load, self.free)
+        bounds = [
+            Bounds(p.length_bounds(u), np.zeros((len(p.obstacles), len(p.points.labels))))
+            for p, u in zip(hand.problems, pulls, strict=True)
+        ]
+        for _ in range(self.settings.max_iterations):
+            over = max(
+                violation(part.point, part.point.slacks(bound))
+                for part, bound in zip(at.blocks, bounds, strict=True)
+            )
+            if at.residual <= tolerance and over <= tolerance:
+                pairs = zip(hand.problems, at.blocks, strict=True)
+                return None if any(meeting_disks(p, part.point) for p, part in pairs) else at
+            if time.thread_time() > self._deadline:
+                return None
+            step = newton_step(hand, at, bounds, self.free)
+            if step is None:
+                return None
+            way.iterations += 1
+            at = self._moved(at, step)
+        return None
+
+    def _moved(self, at: GraspPoint, step: Step) -> GraspPoint:
+        hand = self.hand
+        turn = max(
+            float(np.abs(part).max()) * problem.largest_scale
+            for part, problem in zip(step.fingers, hand.problems, strict=True)
+        )
+        turn = max(turn, float(np.linalg.norm(step.body[3:])))
+        shift = float(np.linalg.norm(step.body[:3]))
+        size = min(1.0, _LARGEST_TURN / max(turn, 1e-12), _LARGEST_SHIFT / max(shift, 1e-12))
+        pose = displaced(at.pose, size * step.body, hand.length) if self.free else at.pose
+        parts = []
+        for index, part in enumerate(at.blocks):
+            point, friction, hold = part.point, part.friction, part.hold
+            multipliers = step.multipliers[index]
+            count = len(point.tensions)
+            forces = np.zeros_like(point.forces)
+            if len(point.pairs):
+                forces[point.pairs[:, 0], point.pairs[:, 1]] = multipliers[count:]
+            if self.body.friction > 0:
+                pushes = np.zeros_like(hold.pushes)
+                along = np.einsum("gi,gij->gj", step.friction[index], friction.tangents)
+                pushes[friction.where] = along @ part.place.rotation
+                hold = replace(hold, pushes=pushes)
+            y = point.at.y + size * step.fingers[index]
+            tensions = multipliers[:count]
+            parts.append(block(hand, index, self.body, pose, y, tensions, forces, hold))
+        return gather(hand, pose, parts, at.load, self.free)
+
+
+def displaced(pose: Pose, motion: np.ndarray, length: float) -> Pose:
+    """Return the pose after a motion (translation in lengths, rotation vector) about its centre."""
+    angle = float(np.linalg.norm(motion[3:]))
+    axis = motion[3:] / angle if angle > 0 else np.array([0.0, 0.0, 1.0])
+    k = skew(axis)
+    turn = np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * (k @ k)
+    return Pose(pose.position + length * motion[:3], quaternion_from_matrix(turn @ pose.rotation))
