@@ -16,10 +16,12 @@ from std_msgs.msg import Header
 
 from ccr_ros.model import (
     Box,
+    Capsule,
     Certificate,
     Contact,
-    Cylinder,
+    ConvexMesh,
     Finger,
+    FiniteCylinder,
     InvalidValue,
     Obstacle,
     Pose,
@@ -82,17 +84,23 @@ def bodies_from_message(message: ObjectArray, gripper_frame: str) -> tuple[Solid
 def obstacle_from_body(body: SolidObject) -> Obstacle:
     """Return the obstacle that a body is to a finger, in the body's frame of reference.
 
-    A cylinder's height is not used: to a finger it is infinite along its axis.
+    Raises:
+        InvalidValue: A mesh is not a convex body; says where.
+        MissingPackage: A mesh is given, and scipy is not installed.
     """
-    if body.kind == "sphere":
-        return Sphere(body.pose.position, body.dimensions[0], name=body.name)
-    if body.kind == "box":
-        return Box(
-            body.pose.position, np.array(body.dimensions), body.pose.orientation, name=body.name
+    position, axis, size = body.pose.position, body.pose.rotation[:, 2], body.dimensions
+    if body.vertices is not None and body.faces is not None:
+        return ConvexMesh(
+            body.vertices, body.faces, position, body.pose.orientation, name=body.name
         )
-    return Cylinder(
-        body.pose.position, body.pose.rotation[:, 2], body.dimensions[1], name=body.name
-    )
+    if body.kind == "sphere":
+        return Sphere(position, size[0], name=body.name)
+    if body.kind == "box":
+        return Box(position, np.array(size), body.pose.orientation, name=body.name)
+    if body.kind == "capsule":
+        half = size[0] / 2 * axis
+        return Capsule(position - half, position + half, size[1], name=body.name)
+    return FiniteCylinder(position, axis, size[0], size[1], name=body.name)
 
 
 def pose_message(position: np.ndarray, orientation: np.ndarray) -> PoseMessage:

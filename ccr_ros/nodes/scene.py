@@ -69,4 +69,4 @@ class ObjectScene:
 
 def _key(body: SolidObject) -> tuple[object, ...]:
     position, orientation = body.pose.position.tolist(), body.pose.orientation.tolist()
-    return body.name, body.kind, body.dimensions, position, orientation
+    return body.name, body.shape, position, orientation

@@ -19,7 +19,8 @@ from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
 from ..model import Contact, Finger, Solution
-from .recording import SolidObject
+from .shapes import triangles
+from .solids import SolidObject
 
 DISK_THICKNESS = 0.002  # m
 DISK_RIM = 0.0015  # m, of the disk outside its holes
@@ -41,6 +42,9 @@ FORCE = (0.95, 0.60, 0.05, 1.0)
 OBJECT = (0.30, 0.75, 0.35, 0.45)
 OBSTACLE = (0.60, 0.60, 0.60, 0.35)
 STALE_ALPHA = 0.35  # a pose that is not that of the newest pulls is see-through
+
+_CORNERS: dict[Hashable, list[Point]] = {}
+_MOST_SHAPES = 32
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,10 +234,22 @@ def _body(body: SolidObject, colour: tuple[float, float, float, float]) -> Marke
     elif body.kind == "box":
         x, y, z = body.dimensions
         marker.type, marker.scale = Marker.CUBE, Vector3(x=x, y=y, z=z)
-    else:
+    elif body.kind == "cylinder":
         height, radius = body.dimensions
         marker.type, marker.scale = Marker.CYLINDER, Vector3(x=2 * radius, y=2 * radius, z=height)
+    else:  # viewers know no capsules, and a mesh resource would have to be a file of theirs
+        marker.type, marker.scale = Marker.TRIANGLE_LIST, Vector3(x=1.0, y=1.0, z=1.0)
+        marker.points = _corners(body)
     return marker
+
+
+def _corners(body: SolidObject) -> list[Point]:
+    """Return the corners of a body's triangles; they stay while it moves, and are kept."""
+    if body.shape not in _CORNERS:
+        if len(_CORNERS) >= _MOST_SHAPES:
+            _CORNERS.clear()
+        _CORNERS[body.shape] = _points(triangles(body).reshape(-1, 3))
+    return _CORNERS[body.shape]
 
 
 def _force_unit(finger: Finger) -> float:

@@ -8,77 +8,19 @@ base frame, as a `Solution` is; the bases and the objects are in the gripper's f
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 
 from ..model import checks
 from ..model.errors import InvalidValue, UnknownName
-from ..model.obstacles import Box, Cylinder, Obstacle, Plane, Sphere
-from ..model.rotation import Pose, quaternion_from_matrix
+from ..model.rotation import Pose
 from ..model.solution import Contact
+from .solids import SolidObject, array, label
 
 FORCES_ARE = ("newton", "per_EI")
 CONTACT_POINTS = ("backbone", "cable", "antagonist")
-DIMENSIONS = {"sphere": ("radius",), "box": ("x", "y", "z"), "cylinder": ("height", "radius")}
-
-
-@dataclass(frozen=True, eq=False)
-class SolidObject:
-    """A primitive body in the gripper's frame, with the dimensions of shape_msgs/SolidPrimitive.
-
-    Attributes:
-        name: Unique in its recording.
-        kind: ``"sphere"``, ``"box"`` or ``"cylinder"``.
-        dimensions: [m]: sphere (radius,); box (x, y, z) full sizes; cylinder (height, radius), its
-            axis along z.
-        pose: Of the body's centre in the gripper's frame.
-    """
-
-    name: str
-    kind: str
-    dimensions: tuple[float, ...]
-    pose: Pose = field(default_factory=Pose)
-
-    def __post_init__(self) -> None:
-        label("name", self.name)
-        if self.kind not in DIMENSIONS:
-            raise InvalidValue("kind", self.kind, f"one of {', '.join(DIMENSIONS)}")
-        names = DIMENSIONS[self.kind]
-        sizes = checks.vector("dimensions", self.dimensions, len(names), unit="m")
-        for name, size in zip(names, sizes, strict=True):
-            checks.real(f"dimensions.{name}", float(size), above=0, unit="m")
-        object.__setattr__(self, "dimensions", tuple(sizes.tolist()))
-
-    @classmethod
-    def from_obstacle(
-        cls, obstacle: Obstacle, base: Pose | None = None, extent: float = 0.3
-    ) -> SolidObject:
-        """Make the body that shows an obstacle.
-
-        Args:
-            obstacle: In the frame whose pose in the gripper is ``base``.
-            base: Pose of the obstacle's frame; default: the gripper's own.
-            extent: How much of an infinite cylinder or of a plane is shown [m].
-        """
-        body = obstacle.moved(base) if base is not None else obstacle
-        if isinstance(body, Sphere):
-            return cls(body.name, "sphere", (body.radius,), Pose(body.center))
-        if isinstance(body, Box):
-            return cls(body.name, "box", tuple(body.size), Pose(body.center, body.orientation))
-        if isinstance(body, Cylinder):
-            return cls(
-                body.name, "cylinder", (extent, body.radius), Pose(body.point, _along(body.axis))
-            )
-        if isinstance(body, Plane):
-            thickness = extent / 100
-            center = body.point - body.normal * thickness / 2
-            return cls(
-                body.name, "box", (extent, extent, thickness), Pose(center, _along(body.normal))
-            )
-        raise InvalidValue("obstacle", type(obstacle).__name__, "a Sphere, Box, Cylinder or Plane")
 
 
 @dataclass(frozen=True, eq=False)
@@ -298,35 +240,8 @@ class Recording:
         if frame.objects is None:
             return self.objects
         return tuple(
-            SolidObject(o.name, o.kind, o.dimensions, frame.objects[o.name])
-            for o in self.objects
-            if o.name in frame.objects
+            replace(o, pose=frame.objects[o.name]) for o in self.objects if o.name in frame.objects
         )
-
-
-def label(place: str, value: Any) -> str:
-    """Return ``value`` as a name to show: any text that is not empty."""
-    if not isinstance(value, str) or not value.strip():
-        raise InvalidValue(place, value, "a text that is not empty")
-    return value
-
-
-def array(place: str, value: Any, shape: tuple[int | None, ...], unit: str = "") -> np.ndarray:
-    """Return a read-only finite float copy of the given shape; ``None`` stands for any length."""
-    words = " x ".join("any" if s is None else str(s) for s in shape)
-    allowed = f"finite numbers of shape {words}" + (f" [{unit}]" if unit else "")
-    try:
-        out = np.array(value, dtype=float)
-    except (TypeError, ValueError):
-        raise InvalidValue(place, value, allowed) from None
-    if out.ndim != len(shape) or any(
-        s not in (None, n) for s, n in zip(shape, out.shape, strict=True)
-    ):
-        raise InvalidValue(place, f"shape {out.shape}", allowed)
-    if not np.isfinite(out).all():
-        raise InvalidValue(place, float(out[~np.isfinite(out)][0]), allowed)
-    out.setflags(write=False)
-    return out
 
 
 def _contact(place: str, contact: Contact, last_disk: int) -> Contact:
@@ -347,11 +262,3 @@ def _unique(place: str, names: list[str]) -> None:
     for i, name in enumerate(names):
         if name in names[:i]:
             raise InvalidValue(f"{place}[{i}].name", name, "unique in its recording")
-
-
-def _along(axis: np.ndarray) -> np.ndarray:
-    """Quaternion of a frame whose z is the given unit vector."""
-    side = np.eye(3)[int(np.argmin(np.abs(axis)))]
-    x = np.cross(side, axis)
-    x /= np.linalg.norm(x)
-    return quaternion_from_matrix(np.column_stack([x, np.cross(axis, x), axis]))

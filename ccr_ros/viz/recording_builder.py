@@ -153,8 +153,8 @@ class RecordingBuilder:
         with self._lock:
             for o in objects:
                 known = self._objects.setdefault(o.name, o)
-                if (known.kind, known.dimensions) != (o.kind, o.dimensions):
-                    was = f"{known.kind} {known.dimensions}"
+                if known.shape != o.shape:
+                    was = f"{known.kind} {known.dimensions or ''}".rstrip()
                     raise InvalidValue(
                         f"objects.{o.name}", (o.kind, o.dimensions), f"as before: {was}"
                     )

@@ -37,10 +37,7 @@ def recording_to_json(recording: Recording) -> str:
             }
             for f in recording.fingers
         ],
-        "objects": [
-            {"name": o.name, "kind": o.kind, "dimensions": list(o.dimensions), **_pose(o.pose)}
-            for o in recording.objects
-        ],
+        "objects": [_object(o) for o in recording.objects],
         "frames": [_frame(frame) for frame in recording.frames],
     }
     return json.dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
@@ -125,6 +122,13 @@ def _significant(value: float) -> float:
 
 def _pose(pose: Pose) -> dict[str, Any]:
     return {"position": _round(pose.position), "orientation": _round(pose.orientation)}
+
+
+def _object(body: SolidObject) -> dict[str, Any]:
+    data = {"name": body.name, "kind": body.kind, "dimensions": list(body.dimensions)}
+    if body.vertices is not None and body.faces is not None:
+        data |= {"vertices": _round(body.vertices), "faces": body.faces.tolist()}
+    return {**data, **_pose(body.pose)}
 
 
 def _frame(frame: Frame) -> dict[str, Any]:
@@ -215,6 +219,8 @@ def _read_object(data: Any) -> SolidObject:
         kind=_get(data, "kind", str),
         dimensions=tuple(_get(data, "dimensions", list)),
         pose=_read_pose(data),
+        vertices=data.get("vertices"),
+        faces=data.get("faces"),
     )
 
 

@@ -4,15 +4,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..model.obstacles import Obstacle
 from ..model.rotation import Pose
-from .recording import SolidObject
+from .solids import SolidObject
 
 _AROUND = 64  # corners of a circle
+_RINGS = 7  # of each half ball of a capsule
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +36,7 @@ def obstacle_surface(obstacle: Obstacle, center: np.ndarray, extent: float) -> S
     """Return the surface of an obstacle; of an infinite one, the part about ``center``.
 
     Args:
-        obstacle: A sphere, cylinder, box or plane.
+        obstacle: The obstacle.
         center: (3,) what the drawing is about [m].
         extent: Length of an infinite cylinder's part, side of a plane's [m].
     """
@@ -50,16 +51,39 @@ def obstacle_surface(obstacle: Obstacle, center: np.ndarray, extent: float) -> S
     else:
         shift = np.zeros(3)
     pose = Pose(body.pose.position + shift, body.pose.orientation)
-    return surface(SolidObject(body.name, body.kind, body.dimensions, pose))
+    return surface(replace(body, pose=pose))
 
 
 def surface(body: SolidObject) -> Surface:
     """Return the surface of a body, in the frame its pose is given in."""
-    makers: dict[str, Callable[..., list[np.ndarray]]]
-    makers = {"sphere": _sphere, "box": _box, "cylinder": _cylinder}
-    faces = makers[body.kind](*body.dimensions)
     turn = body.pose.rotation.T
-    return Surface(tuple(face @ turn + body.pose.position for face in faces))
+    return Surface(tuple(face @ turn + body.pose.position for face in _faces(body)))
+
+
+def triangles(body: SolidObject) -> np.ndarray:
+    """Return a body's surface in its own frame as triangles (t, 3, 3), outside counter-clockwise.
+
+    Faces are convex, and cut into fans.
+    """
+    if body.vertices is not None and body.faces is not None:
+        return body.vertices[body.faces]
+    cut = [
+        np.stack([np.tile(face[0], (len(face) - 2, 1)), face[1:-1], face[2:]], axis=1)
+        for face in _faces(body)
+    ]
+    found = np.concatenate(cut)
+    normals = np.cross(found[:, 1] - found[:, 0], found[:, 2] - found[:, 0])
+    inward = np.einsum("ij,ij->i", normals, found.mean(axis=1)) < 0  # the body is around 0
+    found[inward] = found[inward][:, ::-1]
+    return found[np.linalg.norm(normals, axis=1) > 0]  # fans about a pole have some of no area
+
+
+def _faces(body: SolidObject) -> list[np.ndarray]:
+    if body.vertices is not None and body.faces is not None:
+        return list(body.vertices[body.faces])
+    makers: dict[str, Callable[..., list[np.ndarray]]]
+    makers = {"sphere": _sphere, "box": _box, "cylinder": _cylinder, "capsule": _capsule}
+    return makers[body.kind](*body.dimensions)
 
 
 def hull(points: np.ndarray) -> np.ndarray:
@@ -112,6 +136,16 @@ def _cylinder(height: float, radius: float) -> list[np.ndarray]:
     ring = circle(np.zeros(3), np.eye(3)[0], np.eye(3)[1], radius)
     up = np.array([0.0, 0.0, height / 2])
     return [*_quads(np.stack([ring - up, ring + up])), (ring - up)[:-1], (ring + up)[:-1]]
+
+
+def _capsule(length: float, radius: float) -> list[np.ndarray]:
+    rise = np.linspace(0, np.pi / 2, _RINGS)
+    heights = length / 2 + radius * np.sin(rise)
+    around = np.linspace(0, 2 * np.pi, 4 * _RINGS + 1)
+    wide = radius * np.concatenate([np.cos(rise)[::-1], np.cos(rise)])[:, None]
+    high = np.concatenate([-heights[::-1], heights])[:, None]
+    grid = [wide * np.cos(around), wide * np.sin(around), np.repeat(high, len(around), axis=1)]
+    return _quads(np.stack(grid, axis=-1))
 
 
 def _box(x: float, y: float, z: float) -> list[np.ndarray]:

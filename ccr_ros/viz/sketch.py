@@ -136,7 +136,9 @@ def _draw_body(axes: Any, body: SolidObject, view: View) -> None:
     from matplotlib.collections import PolyCollection
     from matplotlib.patches import Polygon
 
-    skin, center = surface(body), body.pose.position
+    skin = surface(body)
+    # A mesh's frame may be anywhere; its corners are around it, as are the others'.
+    center = skin.vertices.mean(axis=0) if body.kind == "mesh" else body.pose.position
     order = view.nearness(center[None])
     if body.kind == "sphere":
         _shade_ball(axes, view.flat(center[None])[0], body.dimensions[0] * MM, view, order)

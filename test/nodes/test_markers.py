@@ -8,7 +8,7 @@ import pytest
 from probe import shown
 from visualization_msgs.msg import Marker
 
-from ccr_ros.model import Contact, Plane, Pose, load_finger, solve
+from ccr_ros.model import Capsule, Contact, Plane, Pose, load_finger, solve
 from ccr_ros.resources import find_config
 from ccr_ros.viz.markers import (
     HALF_COLOUR_TENSION,
@@ -127,6 +127,29 @@ def test_objects_and_the_files_own_obstacles(solution):
     assert marker.color.a < 1.0
     (own,) = shown(array, "two_cables/obstacles")
     assert (own.type, own.header.frame_id) == (Marker.CUBE, "base")
+
+
+def test_what_viewers_have_no_marker_for_is_drawn_as_triangles(solution):
+    there = Pose(np.array([0.1, 0.0, 0.2]))
+    corners, faces = np.vstack([np.zeros((1, 3)), 0.1 * np.eye(3)]), [[0, 2, 1], [1, 2, 3]]
+    mesh = SolidObject("wedge", "mesh", (), there, corners, faces)
+    pill = SolidObject("pill", "capsule", (0.06, 0.02), there)
+    scene = SceneMarkers()
+    wedge_shown, pill_shown = shown(draw(scene, solution, mesh, pill), "objects")
+    assert wedge_shown.type == pill_shown.type == Marker.TRIANGLE_LIST
+    for marker in (wedge_shown, pill_shown):
+        assert (marker.scale.x, marker.scale.y, marker.scale.z) == (1.0, 1.0, 1.0)
+        assert (marker.pose.position.x, marker.pose.position.z) == (0.1, 0.2)
+        assert 0.0 < marker.color.a < 1.0 and len(marker.points) % 3 == 0
+    points = np.array([[p.x, p.y, p.z] for p in wedge_shown.points])
+    np.testing.assert_allclose(points, corners[np.ravel(faces)])
+    points = np.array([[p.x, p.y, p.z] for p in pill_shown.points])
+    assert len(points) < 3000
+    capsule = Capsule([0, 0, -0.03], [0, 0, 0.03], 0.02)
+    np.testing.assert_allclose(capsule.signed_distance(points), 0, atol=1e-12)
+    # Another shape under the same name is another set of triangles.
+    (marker,) = shown(draw(scene, solution, replace(mesh, vertices=2 * corners)), "objects")
+    np.testing.assert_allclose(marker.points[1].y, 0.2)
 
 
 def test_clear_takes_all_away_and_ids_start_again(solution):

@@ -153,8 +153,8 @@ def test_boxes_and_cylinders_touch(gripping, kind):
     if kind == "box":
         item.primitive = SolidPrimitive(type=SolidPrimitive.BOX, dimensions=[0.1, 0.1, 0.06])
     else:
-        # Lying along y, its height is not used: the finger meets an infinite cylinder.
-        item.primitive = SolidPrimitive(type=SolidPrimitive.CYLINDER, dimensions=[0.01, 0.055])
+        # Lying along y.
+        item.primitive = SolidPrimitive(type=SolidPrimitive.CYLINDER, dimensions=[0.2, 0.055])
         item.pose.orientation.x, item.pose.orientation.w = math.sqrt(0.5), math.sqrt(0.5)
     probe.publish("objects", objects(item))
     state = probe.until(lambda: (s := newest(probe, "finger_1")).contacts and s, "a contact")

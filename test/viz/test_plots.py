@@ -8,7 +8,17 @@ import numpy as np
 import pytest
 import synthetic
 
-from ccr_ros.model import Box, CcrError, Cylinder, InvalidFile, InvalidValue, Plane, Pose
+from ccr_ros.model import (
+    Box,
+    Capsule,
+    CcrError,
+    ConvexMesh,
+    Cylinder,
+    InvalidFile,
+    InvalidValue,
+    Plane,
+    Pose,
+)
 from ccr_ros.viz.plots import figure_of_solution, plot_solution
 from ccr_ros.viz.shapes import hull, obstacle_surface, smooth, surface
 
@@ -126,16 +136,22 @@ def test_all_kinds_of_obstacles_are_drawn(tmp_path) -> None:
             Cylinder(np.array([0.03, 0, 0.1]), np.array([0, 1, 0.2]), 0.015),
             Box(np.array([-0.05, 0, 0.06]), np.array([0.04, 0.03, 0.06])),
             Plane(np.array([0, 0, -0.01]), np.array([0.0, 0, 1])),
+            Capsule([0.1, 0, 0.1], [0.1, 0, 0.15], 0.02),
+            ConvexMesh.hull_of([[0.1, 0, 0], [0.2, 0, 0], [0.1, 0.1, 0], [0.1, 0, 0.03]]),
         )
     )
     figure = figure_of_solution(synthetic.solution(0.3, of=finger))
-    assert len(figure.axes[0].collections) == 3
-    cylinder, box, plane = (p.get_xy() for p in figure.axes[1].patches[:3])
+    assert len(figure.axes[0].collections) == 5
+    cylinder, box, plane, capsule, mesh = (p.get_xy() for p in figure.axes[1].patches[:5])
     np.testing.assert_allclose([cylinder[:, 0].min(), cylinder[:, 0].max()], [15, 45], atol=0.1)
     np.testing.assert_allclose(
         [box.min(axis=0), box.max(axis=0)], [[-70, 30], [-30, 90]], atol=1e-6
     )
     assert plane[:, 1].max() == pytest.approx(-10)
+    np.testing.assert_allclose([capsule.min(axis=0), capsule.max(axis=0)], [[80, 80], [120, 170]])
+    np.testing.assert_allclose(
+        [mesh.min(axis=0), mesh.max(axis=0)], [[100, 0], [200, 30]], atol=1e-9
+    )
 
 
 @pytest.mark.parametrize(

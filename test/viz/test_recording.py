@@ -9,16 +9,12 @@ import pytest
 import synthetic
 
 from ccr_ros.model import (
-    Box,
     Contact,
-    Cylinder,
     Gripper,
     InvalidFile,
     InvalidValue,
     MountedFinger,
-    Plane,
     Pose,
-    Sphere,
     UnknownName,
 )
 from ccr_ros.viz.recording import FingerFrame, Frame, RecordedFinger, Recording, SolidObject
@@ -198,27 +194,6 @@ def test_a_recording_cannot_be_changed_from_outside() -> None:
         frame.cables["inner"] = points
 
 
-def test_obstacles_become_bodies_of_the_same_surface() -> None:
-    base = Pose(np.array([0.1, 0, 0]), np.array([0, 0, np.sqrt(0.5), np.sqrt(0.5)]))
-    ball = SolidObject.from_obstacle(Sphere(np.array([0.02, 0, 0.1]), 0.03, name="b"), base)
-    np.testing.assert_allclose(ball.pose.position, [0.1, 0.02, 0.1], atol=1e-12)
-    box = SolidObject.from_obstacle(Box(np.zeros(3), np.array([0.1, 0.2, 0.3])), base)
-    np.testing.assert_allclose(box.pose.rotation @ [1, 0, 0], [0, 1, 0], atol=1e-12)
-    for axis in ([0, 1, 0], [1, 0, 0], [0, 0, -1], [0.6, 0, 0.8]):
-        rod = SolidObject.from_obstacle(
-            Cylinder(np.zeros(3), np.array(axis, float), 0.01), extent=0.2
-        )
-        assert rod.dimensions == (0.2, 0.01)
-        np.testing.assert_allclose(rod.pose.rotation[:, 2], axis, atol=1e-12)
-        plane = SolidObject.from_obstacle(Plane(np.array([0, 0, 0.5]), np.array(axis, float)))
-        top = plane.pose.position + plane.dimensions[2] / 2 * plane.pose.rotation[:, 2]
-        np.testing.assert_allclose(top, [0, 0, 0.5], atol=1e-12)
-    with pytest.raises(InvalidValue, match="kind"):
-        SolidObject("a", "cone", (1.0,))
-    with pytest.raises(InvalidValue, match=r"dimensions\.radius"):
-        SolidObject("a", "cylinder", (1.0, -0.1))
-
-
 def test_builder_shows_a_finger_once_all_it_needs_has_arrived() -> None:
     pose = synthetic.solution(0.5)
     builder = RecordingBuilder("g", [FINGER])
@@ -261,6 +236,12 @@ def test_builder_follows_objects_that_come_move_and_go() -> None:
     assert shown == [[], [0.0], [0.1], []]
     with pytest.raises(InvalidValue, match=r"objects\.ball"):
         builder.set_objects([SolidObject("ball", "sphere", (0.06,))])
+    corners, faces = np.vstack([np.zeros((1, 3)), np.eye(3)]), [[0, 2, 1], [1, 2, 3]]
+    wedge = SolidObject("wedge", "mesh", (), Pose(), corners, faces)
+    builder.set_objects([wedge])
+    builder.set_objects([replace(wedge, vertices=corners.copy())])
+    with pytest.raises(InvalidValue, match=r"objects\.wedge.*as before: mesh"):
+        builder.set_objects([replace(wedge, vertices=2 * corners)])
 
 
 def test_builder_of_a_gripper() -> None:

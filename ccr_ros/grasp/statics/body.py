@@ -135,9 +135,9 @@ def capsule_body(
     pose: Pose | None = None,
     friction: float = 0.0,
 ) -> Body:
-    """Return a capsule along z; ``length`` is that of the whole, ends included [m]."""
+    """Return a capsule along z; ``length`` is that between its half balls' centres [m]."""
     radius = checks.real("diameter", diameter, above=0, unit="m") / 2
-    half = checks.real("length", length, above=2 * radius, unit="m") / 2 - radius
+    half = checks.real("length", length, above=0, unit="m") / 2
     return _body(Capsule(-half * _Z, half * _Z, radius, name="capsule"), mass, pose, friction)
 
 

@@ -52,9 +52,7 @@ function boxFaces([x, y, z]) {
     normal[axis] = sign; u[a] = size[a]; v[b] = size[b];
     const corner = sub(scale(size, -0.5), [0, 0, 0]);
     corner[axis] = sign * size[axis] / 2;
-    const quads = patch(corner, u, v, normal, 6);
-    if (axis === 2) quads[0].shadow = [corner, add(corner, u), add(add(corner, u), v), add(corner, v)];
-    faces.push(...quads);
+    faces.push(...patch(corner, u, v, normal, 6));
   }
   return faces;
 }
@@ -72,8 +70,55 @@ function cylinderFaces([height, radius]) {
       faces.push({ corners: [[0, 0, z], at(i, z), at(i + 1, z)], normal: [0, 0, sign] });
     }
   }
-  faces[0].shadow = CIRCLE.map((_, i) => at(i, -height / 2));
   return faces;
+}
+
+function capsuleFaces([span, radius]) {
+  const faces = [], rings = 6, levels = 6, rows = [];
+  const ring = (a, z) => rows.push([radius * Math.cos(a), z + radius * Math.sin(a), a]);
+  for (let k = -rings; k <= 0; k++) ring(k * Math.PI / 2 / rings, -span / 2);
+  for (let k = 1; k < levels; k++) ring(0, -span / 2 + span * k / levels);
+  for (let k = 0; k <= rings; k++) ring(k * Math.PI / 2 / rings, span / 2);
+  const at = ([r, z], i) => [r * CIRCLE[i % RIM][0], r * CIRCLE[i % RIM][1], z];
+  for (let k = 0; k + 1 < rows.length; k++) for (let i = 0; i < RIM; i++) {
+    const turn = (i + 0.5) * 2 * Math.PI / RIM, rise = (rows[k][2] + rows[k + 1][2]) / 2;
+    const normal = [Math.cos(rise) * Math.cos(turn), Math.cos(rise) * Math.sin(turn), Math.sin(rise)];
+    faces.push({ corners: [at(rows[k], i), at(rows[k], i + 1), at(rows[k + 1], i + 1), at(rows[k + 1], i)], normal });
+  }
+  return faces;
+}
+
+const meshes = new WeakMap(); // by the array of vertices, which stays while the body moves
+
+/** Triangles of a mesh, long ones cut up so that they sort well against what is near them. */
+function meshFaces({ vertices, faces }) {
+  if (meshes.has(vertices)) return meshes.get(vertices);
+  const spans = [0, 1, 2].map((i) => Math.max(...vertices.map((v) => v[i])) - Math.min(...vertices.map((v) => v[i])));
+  const longest = Math.max(...spans) / 5, out = [];
+  const cut = (corners, normal) => {
+    const sides = corners.map((p, i) => length(sub(corners[(i + 1) % 3], p))), i = sides.indexOf(Math.max(...sides));
+    if (sides[i] <= longest) { out.push({ corners, normal }); return; }
+    const [a, b, c] = [0, 1, 2].map((k) => corners[(i + k) % 3]), middle = mix(a, b, 0.5);
+    cut([a, middle, c], normal);
+    cut([middle, b, c], normal);
+  };
+  for (const face of faces) {
+    const corners = face.map((k) => vertices[k]);
+    cut(corners, unit(cross(sub(corners[1], corners[0]), sub(corners[2], corners[0]))));
+  }
+  meshes.set(vertices, out);
+  return out;
+}
+
+const facesOf = (body) => (body.kind === "mesh" ? meshFaces(body)
+  : { box: boxFaces, cylinder: cylinderFaces, capsule: capsuleFaces }[body.kind](body.dimensions));
+
+/** Radius of a ball about a body's position that holds it. */
+function reachOf(body) {
+  if (body.kind === "mesh") return Math.max(...body.vertices.map(length));
+  if (body.kind === "sphere") return body.dimensions[0];
+  if (body.kind === "capsule") return body.dimensions[0] / 2 + body.dimensions[1];
+  return 0.5 * Math.hypot(...body.dimensions);
 }
 
 /** Circles of latitude and longitude, so that a turning ball is seen to turn. */

@@ -41,7 +41,7 @@ class Scene {
         }
       });
       for (const body of objectsAt(this.data, frame)) {
-        const r = body.kind === "sphere" ? body.dimensions[0] : 0.5 * Math.hypot(...body.dimensions);
+        const r = reachOf(body);
         if (r < 0.25) for (const d of [[r, 0, 0], [0, r, 0], [0, 0, r]]) points.push(add(body.position, d), sub(body.position, d));
       }
     });
@@ -263,7 +263,7 @@ class Scene {
   addObject(body, shadows) {
     const pose = { origin: body.position, axes: axesOf(body.orientation) };
     if (body.kind === "sphere") this.addSphere(pose, body.dimensions[0], shadows);
-    else this.addSolid(pose, body.kind === "box" ? boxFaces(body.dimensions) : cylinderFaces(body.dimensions), shadows);
+    else this.addSolid(pose, facesOf(body), shadows);
   }
 
   addSphere(pose, radius, shadows) {
@@ -297,11 +297,13 @@ class Scene {
   }
 
   addSolid(pose, faces, shadows) {
-    const { camera, theme } = this;
+    const { camera, theme } = this, shadow = new Path2D();
+    shadows.push({ path: shadow }); // of what faces down: a convex body's whole shadow, once
     for (const face of faces) {
       const corners = face.corners.map((p) => place(pose, p)), normal = turn(pose.axes, face.normal);
       const middle = scale(corners.reduce(add), 1 / corners.length);
-      if (face.shadow) shadows.push({ path: this.polygon(this.shadowOf(face.shadow.map((p) => place(pose, p)))) });
+      const order = dot(cross(sub(corners[1], corners[0]), sub(corners[2], corners[0])), normal) < 0 ? [...corners].reverse() : corners;
+      if (normal[2] < 0) shadow.addPath(this.polygon(this.shadowOf(order))); // one way round: no seams
       if (dot(normal, sub(camera.position, middle)) <= 0) continue;
       const path = this.polygon(corners), light = 0.66 + 0.5 * Math.max(0, dot(normal, camera.light));
       const color = css(shade(mix(theme.objectDark, theme.object, 0.75), light));
