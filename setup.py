@@ -27,6 +27,7 @@ FEATURES = {
     "plot": ["matplotlib>=3.8,<4"],
     "record": ["mcap>=1.2,<2"],
     "design": ["scipy>=1.11,<2"],
+    "quality": ["scipy>=1.11,<2"],
     "print": ["manifold3d>=3.1,<4", "trimesh>=4.5,<6"],
     "mesh": ["scipy>=1.11,<2", "trimesh>=4.5,<6"],
     "dynamixel": ["dynamixel-sdk>=3.8.4,<5"],
