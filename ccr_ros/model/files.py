@@ -12,7 +12,7 @@ from . import checks
 from .errors import InvalidFile, InvalidValue
 from .file_checks import located, mapping, sequence
 from .finger import MAX_SEGMENTS, Cable, Finger
-from .obstacles import Box, Cylinder, Obstacle, Plane, Sphere
+from .obstacle_files import obstacles_from_list
 from .rotation import Pose
 from .yaml_reader import read_mapping
 
@@ -23,12 +23,6 @@ _FINGER_KEYS = {
 _FINGER_NEEDS = {
     "name", "length", "segments", "disk_radius", "backbone_diameter", "poisson_ratio", "cables",
 }  # fmt: skip
-_OBSTACLES: dict[str, tuple[type[Obstacle], set[str], set[str]]] = {
-    "sphere": (Sphere, {"center", "radius"}, set()),
-    "cylinder": (Cylinder, {"point", "axis", "radius"}, set()),
-    "box": (Box, {"center", "size"}, {"orientation", "edge_radius"}),
-    "plane": (Plane, {"point", "normal"}, set()),
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,13 +50,13 @@ def load_finger(path: str | Path) -> Finger:
     """Read a finger file. A key without a value (null) counts as not given.
 
     Raises:
-        InvalidFile: The file cannot be read, is not YAML, or is not a mapping.
+        InvalidFile: The file, or an STL file it names, cannot be read, or is not what it should be.
         InvalidValue: A key is unknown or missing, or a value is out of range; says file and place.
     """
     data = read_mapping(path)
     if "fingers" in data and "cables" not in data:
         raise InvalidFile(path, "describes a gripper (it has 'fingers'); a finger file is wanted")
-    return finger_from_dict(data, source=str(path))
+    return finger_from_dict(data, source=str(path), folder=Path(path).parent)
 
 
 def load_gripper(path: str | Path) -> Gripper:
@@ -96,11 +90,16 @@ def load_gripper(path: str | Path) -> Gripper:
     return Gripper(name, tuple(fingers))
 
 
-def finger_from_dict(data: Any, source: str | None = None) -> Finger:
+def finger_from_dict(data: Any, source: str | None = None, folder: Path | None = None) -> Finger:
     """Make a finger from the mapping that a finger file holds; see `load_finger`.
 
+    Args:
+        data: The mapping.
+        source: The file it came from, for messages.
+        folder: What paths in it are relative to; default: the working directory.
+
     Raises:
-        InvalidValue: As for `load_finger`; its ``source`` is the given one.
+        InvalidValue, InvalidFile: As for `load_finger`; ``source`` is the given one.
     """
     try:
         values = mapping(data, _FINGER_NEEDS, _FINGER_KEYS - _FINGER_NEEDS)
@@ -112,21 +111,11 @@ def finger_from_dict(data: Any, source: str | None = None) -> Finger:
             located(f"cables[{i}]", _cable, c, holes_per_disk, disks)
             for i, c in enumerate(sequence("cables", values["cables"]))
         ]
-        values["obstacles"] = obstacles_from_list(values.get("obstacles", []), "obstacles")
+        obstacles = values.get("obstacles", [])
+        values["obstacles"] = obstacles_from_list(obstacles, "obstacles", folder)
         return Finger(**values)
     except InvalidValue as error:
         raise error.located("", source) from None
-
-
-def obstacles_from_list(entries: Any, place: str = "obstacles") -> tuple[Obstacle, ...]:
-    """Make obstacles from a list of mappings with a ``type`` key (and an optional ``name``)."""
-    obstacles: list[Obstacle] = []
-    for i, entry in enumerate(sequence(place, entries)):
-        obstacle = located(f"{place}[{i}]", _obstacle, entry, i)
-        if obstacle.name in {o.name for o in obstacles}:
-            raise InvalidValue(f"{place}[{i}].name", obstacle.name, "unique among the obstacles")
-        obstacles.append(obstacle)
-    return tuple(obstacles)
 
 
 def _mounted(entry: Any, gripper_file: Path, place: str) -> MountedFinger:
@@ -139,7 +128,8 @@ def _mounted(entry: Any, gripper_file: Path, place: str) -> MountedFinger:
         inline = entry["finger"]
         if isinstance(inline, Mapping):  # else the error says so
             inline = {**inline, "name": name}
-        return MountedFinger(located("finger", finger_from_dict, inline), base)
+        made = located("finger", finger_from_dict, inline, None, gripper_file.parent)
+        return MountedFinger(made, base)
     if not isinstance(entry["file"], str):
         raise InvalidValue("file", entry["file"], "a path relative to the gripper file")
     file = gripper_file.parent / entry["file"]
@@ -148,7 +138,8 @@ def _mounted(entry: Any, gripper_file: Path, place: str) -> MountedFinger:
     except InvalidFile as error:
         named = f"{error.reason} (named by {gripper_file}: {place}.file)"
         raise InvalidFile(file, named) from None
-    return MountedFinger(finger_from_dict({**description, "name": name}, str(file)), base)
+    made = finger_from_dict({**description, "name": name}, str(file), file.parent)
+    return MountedFinger(made, base)
 
 
 def _base(entry: Any) -> Pose:
@@ -174,14 +165,3 @@ def _cable(entry: Any, holes_per_disk: int, disks: int) -> Cable:
             allowed = f"{last + 1} numbers, for disks 0..{last} (last_disk); got {len(routing)}"
             raise InvalidValue(key, routing, allowed)
     return cable
-
-
-def _obstacle(entry: Any, index: int) -> Obstacle:
-    kind = mapping(entry, {"type"}, None)["type"]
-    if not isinstance(kind, str) or kind not in _OBSTACLES:
-        raise InvalidValue("type", kind, f"one of {', '.join(_OBSTACLES)}")
-    cls, needs, may = _OBSTACLES[kind]
-    values = mapping(entry, needs | {"type"}, may | {"name"})
-    del values["type"]
-    values["name"] = checks.label("name", values.get("name", f"{kind}_{index}"))
-    return cls(**values)

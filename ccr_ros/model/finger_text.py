@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,7 @@ import yaml
 
 from .errors import InvalidFile
 from .finger import Cable, Finger
-from .obstacles import Obstacle
+from .obstacle_files import obstacle_to_dict
 
 _AT_HOLE = 1e-12  # rad; `Cable.from_holes` is right to this
 
@@ -40,7 +39,7 @@ def finger_to_dict(finger: Finger) -> dict[str, Any]:
         data["rest_curvature"] = rest.tolist()
     data["cables"] = [_cable(cable, finger.holes_per_disk) for cable in finger.cables]
     if finger.obstacles:
-        data["obstacles"] = [_obstacle(obstacle) for obstacle in finger.obstacles]
+        data["obstacles"] = [obstacle_to_dict(obstacle) for obstacle in finger.obstacles]
     return data
 
 
@@ -80,12 +79,4 @@ def _cable(cable: Cable, holes_per_disk: int) -> dict[str, Any]:
         entry["holes"] = [int(h) % holes_per_disk + 1 for h in holes]
     else:
         entry["angles"] = cable.angles.tolist()
-    return entry
-
-
-def _obstacle(obstacle: Obstacle) -> dict[str, Any]:
-    entry: dict[str, Any] = {"type": type(obstacle).__name__.lower(), "name": obstacle.name}
-    for field in fields(obstacle):
-        value = getattr(obstacle, field.name)
-        entry[field.name] = value.tolist() if isinstance(value, np.ndarray) else value
     return entry

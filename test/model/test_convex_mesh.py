@@ -178,7 +178,8 @@ SADDLE = CORNERS + np.array([[0.01, 0, 0] if k == 7 else [0, 0, 0] for k in rang
 FOLDED = [*(s for s in SIDES if s not in ([4, 6, 7], [4, 7, 5])), [4, 6, 5], [6, 7, 5]]
 
 BAD = {
-    "few": (CORNERS[:3], [[0, 1, 2], [0, 2, 1]], "vertices", "not in one plane"),
+    "few": (CORNERS[:3], [[0, 1, 2], [0, 2, 1]], "vertices", "at least 4"),
+    "sheet": (CORNERS, [[0, 1, 2], [0, 2, 1]], "faces", "at least 4"),
     "flat": (CORNERS * [1, 1, 0], SIDES, "vertices", "not in one plane"),
     "thin": (CORNERS * [1, 1, 1e-7], SIDES, "vertices", "not flat"),
     "nan": ([*CORNERS[:-1].tolist(), [0, np.nan, 0]], SIDES, "vertices[7][1]", "finite"),
@@ -186,8 +187,8 @@ BAD = {
     "inf": (np.where(CORNERS > 0, np.inf, 0.0), SIDES, "vertices[1][2]", "finite"),
     "two numbers": (CORNERS[:, :2], SIDES, "vertices[0]", "3 finite numbers"),
     "text": ("cube", SIDES, "vertices", "a list of vectors"),
-    "no vertices": ([], SIDES, "faces[0][0]", "integer"),
-    "no faces": (CORNERS, [], "vertices", "not in one plane"),
+    "no vertices": ([], SIDES, "vertices", "at least 4"),
+    "no faces": (CORNERS, [], "faces", "at least 4"),
     "index": (CORNERS, [*SIDES[:-1], [1, 7, 8]], "faces[11][2]", "0..7"),
     "negative": (CORNERS, np.array([*SIDES[:-1], [1, 7, -1]]), "faces[11][2]", "0..7"),
     "fraction": (CORNERS, [*SIDES[:-1], [1, 7, 3.0]], "faces[11][2]", "integer"),

@@ -23,7 +23,6 @@ from ccr_ros.model import (
     load_finger,
 )
 from ccr_ros.model.errors import MissingKey, UnknownKey
-from ccr_ros.model.files import obstacles_from_list
 
 TEXT = """\
 name: small
@@ -307,69 +306,6 @@ def test_rest_curvature_at_several_places_of_segments():
     assert error.allowed.startswith("2 vectors of 3 numbers [1/m], at the start and the end of")
     error = refused(changed(rest_curvature=[[[0, 0, 0]], [[0, 0, 0]]]))
     assert error.allowed.startswith("2, 4, .. or 16 vectors")
-
-
-SPHERE = {"type": "sphere", "center": [0, 0, 1], "radius": 0.1}
-CYLINDER = {"type": "cylinder", "point": [0, 0, 1], "axis": [0, 1, 0], "radius": 0.1}
-BOX = {"type": "box", "center": [0, 0, 1], "size": [1, 1, 1], "orientation": [0, 0, 0, 1]}
-PLANE = {"type": "plane", "point": [0, 0, -1], "normal": [0, 0, 1]}
-ORIENTATIONS = ([0, 0, 0, 0], [0, 0, 0, 2], [0, 0, 1], [1e200] * 4, "none", [0, 0, 0, math.nan])
-
-
-@pytest.mark.parametrize(
-    ("good", "key", "values"),
-    [
-        (SPHERE, "center", [1, [0, 0], [0, 0, 0, 0], "abc", [0, 0, None], [0, 0, 1e7]]),
-        (SPHERE, "radius", [0, -1, "1", math.inf, True, 1e7]),
-        (CYLINDER, "point", [1, [0, 0], [0, math.nan, 0]]),
-        (CYLINDER, "axis", [[0, 0, 0], [0, 0, 1e-200], [0, 0], 3, [True, 0, 0]]),
-        (CYLINDER, "radius", [0, -1]),
-        (BOX, "center", [0, [0]]),
-        (BOX, "size", [1, [1, 1], [1, 0, 1], [1, -1, 1], [1, 1, math.inf]]),
-        (BOX, "orientation", ORIENTATIONS),
-        (BOX, "edge_radius", [0, -0.1, 0.51, "x", math.nan]),
-        (PLANE, "point", [[0, 0], 0, [0, 0, "0"]]),
-        (PLANE, "normal", [[0, 0, 0], 1]),
-    ],
-)
-def test_bad_obstacle_values(good, key, values):
-    finger_from_dict(changed(obstacles=[good]))
-    for value in values:
-        place = refused(changed(obstacles=[SPHERE, {**good, key: value}])).place
-        assert place.startswith(f"obstacles[1].{key}")
-
-
-@pytest.mark.parametrize("good", [SPHERE, CYLINDER, BOX, PLANE], ids=lambda o: o["type"])
-def test_obstacle_keys(good):
-    for key in good:
-        absent = {k: v for k, v in good.items() if k != key}
-        if key == "orientation":
-            finger_from_dict(changed(obstacles=[absent]))
-        else:
-            error = refused(changed(obstacles=[absent]))
-            assert isinstance(error, MissingKey) and error.place == f"obstacles[0].{key}"
-    error = refused(changed(obstacles=[{**good, "colour": "red"}]))
-    assert isinstance(error, UnknownKey) and error.place == "obstacles[0].colour"
-
-
-@pytest.mark.parametrize("value", ["sphere", {}, SPHERE, False, 0, "", 3])
-def test_obstacles_must_be_a_list(value):
-    error = refused(changed(obstacles=value))
-    assert (error.place, error.allowed) == ("obstacles", "a list")
-
-
-@pytest.mark.parametrize("kind", ["ball", "Sphere", 3, ["sphere"], {}])
-def test_obstacle_types_are_listed(kind):
-    error = refused(changed(obstacles=[{"type": kind}]))
-    assert (error.place, error.value) == ("obstacles[0].type", kind)
-    assert error.allowed == "one of sphere, cylinder, box, plane"
-
-
-def test_obstacle_names_are_unique_and_made_up_where_absent():
-    names = [o.name for o in obstacles_from_list([SPHERE, PLANE, {**SPHERE, "name": "ball"}])]
-    assert names == ["sphere_0", "plane_1", "ball"]
-    clash = [{**PLANE, "name": "plane_1"}, PLANE]
-    assert refused(changed(obstacles=clash)).place == "obstacles[1].name"
 
 
 scalars = st.one_of(

@@ -59,7 +59,11 @@ class ConvexMesh(Obstacle):
             orientation=checks.quaternion("orientation", self.orientation),
         )
         vertices = checks.rows("vertices", self.vertices, 3, unit="m", largest=FAR)
+        if len(vertices) < 4:
+            raise InvalidValue("vertices", f"{len(vertices)} points", "at least 4 points")
         faces = checks.index_rows("faces", self.faces, 3, len(vertices))
+        if len(faces) < 4:
+            raise InvalidValue("faces", f"{len(faces)} triangles", "at least 4 triangles")
         check_watertight(faces)
         used = vertices[np.unique(faces)]
         hull = convex_hull("vertices", used)

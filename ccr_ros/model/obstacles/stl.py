@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 
 import numpy as np
@@ -31,10 +32,13 @@ def read_stl(path: str | Path, scale: float) -> tuple[np.ndarray, np.ndarray]:
     except ImportError:
         raise MissingPackage("an STL file", "trimesh", "mesh") from None
     try:
-        with open(path, "rb") as file:
-            mesh = trimesh.load_mesh(file, file_type="stl")
-    except OSError as error:
-        raise InvalidFile(path, f"cannot be read: {error.strerror or error}") from None
+        content = Path(path).read_bytes()
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InvalidFile(path, f"cannot be read: {reason}") from None
+    try:
+        with np.errstate(all="ignore"):  # numbers are checked below
+            mesh = trimesh.load_mesh(io.BytesIO(content), file_type="stl")
     except Exception as error:  # trimesh raises whatever its parser stumbles over
         raise InvalidFile(path, f"is no STL file ({_line(error)})") from None
     vertices, faces = np.asarray(mesh.vertices, float), np.asarray(mesh.faces, int)
