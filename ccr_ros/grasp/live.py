@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The object of a running gripper: put down, held, heavier, dropped, put back."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ccr_ros.grasp.statics import Body, GraspSolution, GraspSolver
+from ccr_ros.grasp.statics.solver import Pulls
+from ccr_ros.model.files import MountedFinger
+from ccr_ros.model.rotation import Pose
+from ccr_ros.model.settings import SolverSettings
+
+
+class LiveGrasp:
+    """Keeps fingers and object in equilibrium, as somebody says from time to time what is wanted.
+
+    `want` says where the object is, how heavy, and whether the fingers alone carry it; `solve`
+    sees to it with the pulls of now. What cannot be is said in `failure` and `refusal`; then
+    `solution` is the last good one.
+
+    Args:
+        fingers: The fingers, with all that is in their way but the object.
+        body: The object, at the pose that is said of it.
+        settings: Of the solver.
+        gravity: (3,) [m/s^2] in the gripper's frame.
+        at: Where the object is, if not at the pose that is said of it.
+
+    Raises:
+        InvalidValue: As for `GraspSolver`.
+    """
+
+    def __init__(
+        self,
+        fingers: Sequence[MountedFinger],
+        body: Body,
+        settings: SolverSettings,
+        gravity: np.ndarray,
+        at: Pose | None = None,
+    ) -> None:
+        start = body if at is None else replace(body, pose=at)
+        self._solver = GraspSolver(fingers, start, settings, gravity)
+        self._said = body.pose
+        self._mass = body.mass
+        self._wanted = False  # whether it shall be held
+        self._to_let_go = False
+        self.solution: GraspSolution | None = None  # the last good one
+        self.failure = ""
+        """Why the newest wishes or pulls have no solution; a held object is dropped then."""
+        self.refusal = ""
+        """Why an object that shall be held stands."""
+
+    @property
+    def body(self) -> Body:
+        """The object where it is, or was last known to be."""
+        return self._solver.body
+
+    @property
+    def supported(self) -> bool:
+        """Whether it stands, and is not left to the fingers."""
+        return self._solver.supported
+
+    @property
+    def held(self) -> bool:
+        """Whether the fingers carry it."""
+        return not self._solver.supported and not self.failure
+
+    def place(self, pose: Pose, held: bool) -> Pose:
+        """Return where the object is once this is said of it.
+
+        An object that is held, or of which the same is said as before, is where it is; one that
+        was dropped is at the pose that is said, because nobody knows where it went.
+        """
+        stays = held or (_same(pose, self._said) and not self.failure)
+        if self._solver.supported:
+            stays = _same(pose, self._said)
+        return self._solver.body.pose if stays else pose
+
+    def want(self, pose: Pose, mass: float, held: bool) -> bool:
+        """Say what is wanted; return whether there is something to `solve`.
+
+        Where the object shall be held, and is not, saying so again has it tried again.
+
+        Args:
+            pose: Of the object in the gripper's frame; see `place`.
+            mass: [kg].
+            held: Whether the fingers alone carry it.
+        """
+        due = mass != self._mass or held != self._wanted or (held and not self.held)
+        place = self.place(pose, held)
+        stands = self._solver.supported or not held
+        if stands and not (self._solver.supported and place is self._solver.body.pose):
+            self._solver.support(place)
+            due = True
+        self._said, self._mass, self._wanted = pose, mass, held
+        self._to_let_go = held and self._solver.supported
+        if not held:
+            self.refusal = ""
+        return due
+
+    def solve(self, pulls: Pulls) -> GraspSolution:
+        """Return the equilibrium for pulls [m] by finger, or how far it came where there is none.
+
+        Raises:
+            InvalidValue, UnknownName: Bad pulls; nothing has moved.
+        """
+        found = self._solver.solve(pulls, mass=self._mass)
+        self.failure = ""
+        if not found.converged:
+            self.failure = found.message if found.supported else f"dropped: {found.message}"
+            return found
+        if not found.supported and not found.contacts:
+            self.failure = "dropped: no finger touches it any more"
+            return found
+        if self._to_let_go:
+            found = self._let_go(found)
+        self.solution = found
+        return found
+
+    def _let_go(self, standing: GraspSolution) -> GraspSolution:
+        self._to_let_go = False
+        if not standing.contacts:
+            self.refusal = "it stands still: no finger touches it"
+            return standing
+        found = self._solver.let_go()
+        if not found.converged:
+            self.refusal = f"it stands still: {found.message}"
+            return standing
+        self.refusal = ""
+        return found
+
+
+def _same(one: Pose, two: Pose) -> bool:
+    return bool(
+        np.array_equal(one.position, two.position)
+        and np.array_equal(one.orientation, two.orientation)
+    )
