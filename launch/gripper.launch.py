@@ -16,6 +16,12 @@ ARGUMENTS = (
     ("gripper_file", "gripper_sphere", "Gripper file: a path, or the name of one in config/", None),
     ("servo_file", "", "Servo file: a path or a name; empty: the servo bridge's default", None),
     ("driver", "loopback", "How servos are reached", ["loopback", "ros2_control", "dynamixel"]),
+    (
+        "mode",
+        "",
+        "Solver node: each finger by itself, or with the object; empty: its own default",
+        ["", "fingers", "gripper"],
+    ),
     ("namespace", "gripper", "Namespace of the nodes, and prefix of the frames", None),
     ("params_file", "", "Parameter file for all nodes; empty: none", None),
     ("coordinator", "true", "Whether the gripper coordinator runs", ["true", "false"]),
@@ -52,7 +58,11 @@ def _nodes(context, *args, **kwargs):
         )
 
     servos = {"servo_file": given["servo_file"]} if given["servo_file"] else {}
-    nodes = [node("solver_node"), node("servo_bridge_node", driver=given["driver"], **servos)]
+    mode = {"mode": given["mode"]} if given["mode"] else {}
+    nodes = [
+        node("solver_node", **mode),
+        node("servo_bridge_node", driver=given["driver"], **servos),
+    ]
     if given["coordinator"] == "true":
         nodes.append(node("gripper_coordinator_node"))
     if given["rviz"] == "true":

@@ -64,6 +64,7 @@ def test_by_default_the_three_nodes_of_the_sphere_gripper(launch_file):
         assert name in scripts
         assert (kwargs["package"], kwargs["namespace"]) == ("ccr_ros", "gripper")
         assert kwargs["parameters"][-1]["gripper_file"] == "gripper_sphere"
+        assert "mode" not in kwargs["parameters"][-1]  # a parameter file may say
     assert made["servo_bridge_node"]["parameters"][-1]["driver"] == "loopback"
 
 
@@ -73,6 +74,7 @@ def test_arguments_reach_the_nodes(launch_file):
         gripper_file="my.yaml",
         servo_file="servos.yaml",
         driver="dynamixel",
+        mode="gripper",
         namespace="/left/",
         params_file="params.yaml",
         coordinator="false",
@@ -83,17 +85,20 @@ def test_arguments_reach_the_nodes(launch_file):
     assert files == "params.yaml"
     assert own == {"gripper_file": "my.yaml", "driver": "dynamixel", "servo_file": "servos.yaml"}
     assert made["solver_node"]["namespace"] == "left"
+    assert made["solver_node"]["parameters"][-1] == {"gripper_file": "my.yaml", "mode": "gripper"}
     assert made["rviz2"]["arguments"] == [
         "-d", "/share/ccr_ros/rviz/gripper.rviz", "-f", "left/gripper_base",
     ]  # fmt: skip
 
 
-def test_choices_are_those_of_the_servo_bridge(launch_file):
+def test_choices_are_those_of_the_nodes(launch_file):
+    from ccr_ros.nodes.parameters import MODES
     from ccr_ros.nodes.servo_parameters import DRIVERS
 
     arguments = launch_file.generate_launch_description().args[0][:-1]
     choices = {a.args[0]: a.kwargs["choices"] for a in arguments}
     assert tuple(choices["driver"]) == DRIVERS
+    assert tuple(choices["mode"]) == ("", *MODES)
     assert all(a.kwargs["description"] for a in arguments)
 
 

@@ -9,6 +9,7 @@ nothing had failed, 1 a node had ended by itself, 2 bad input.
 
   ccr up
   ccr up my_gripper.yaml --servos my_servos.yaml --driver dynamixel --namespace /left
+  ccr up --mode gripper
   ccr up --without gripper_coordinator_node --params my_parameters.yaml
 """
 
@@ -22,6 +23,7 @@ from pathlib import Path
 from ccr_ros.model.errors import InvalidFile, InvalidValue
 
 DRIVERS = ("loopback", "ros2_control", "dynamixel")
+MODES = ("fingers", "gripper")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -36,6 +38,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--driver",
         metavar="NAME",
         help=f"how servos are reached: {', '.join(DRIVERS)} (default: loopback, simulated servos)",
+    )
+    parser.add_argument(
+        "--mode",
+        metavar="NAME",
+        help="solver node: fingers (default), each by itself, or gripper, with the object in hand",
     )
     parser.add_argument("--namespace", metavar="NS", default="/gripper", help="default: /gripper")
     parser.add_argument(
@@ -70,6 +77,8 @@ def run(args: argparse.Namespace) -> int:
         raise InvalidValue("--without", ", ".join(args.without), "not all of the nodes")
     if args.driver is not None and args.driver not in DRIVERS:
         raise UnknownName("driver", args.driver, DRIVERS)
+    if args.mode is not None and args.mode not in MODES:
+        raise UnknownName("mode", args.mode, MODES)
     namespace = "/" + args.namespace.strip("/")
     # What is wrong with a file is told here and once, not by each node.
     gripper = find_config(args.gripper)
@@ -83,6 +92,8 @@ def run(args: argparse.Namespace) -> int:
             own["servo_bridge_node"]["servo_file"] = str(find_config(args.servos))
         if args.driver is not None:
             own["servo_bridge_node"]["driver"] = args.driver
+    if "solver_node" in own and args.mode is not None:
+        own["solver_node"]["mode"] = args.mode
     plan = Plan(
         parts=tuple(node_part(name) for name in chosen),
         arguments={n: arguments_for(namespace, p, args.params, ()) for n, p in own.items()},

@@ -22,7 +22,7 @@ from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
 
 from ccr_ros.model import CcrError, Contact, FingerSolver, Gripper
-from ccr_ros.nodes.conversions import bodies_from_message
+from ccr_ros.nodes.object_conversions import objects_from_message
 from ccr_ros.nodes.qos import (
     COMMAND,
     COMMAND_QUEUE,
@@ -239,7 +239,8 @@ class Recorder(Node):
 
     def _objects_heard(self, message: ObjectArray) -> None:
         try:
-            self._builder.set_objects(bodies_from_message(message, message.header.frame_id))
+            objects = objects_from_message(message, message.header.frame_id)
+            self._builder.set_objects([item.solid for item in objects])
         except CcrError as error:
             self.get_logger().warning(
                 f"objects not recorded: {error}", throttle_duration_sec=_WARN_EVERY

@@ -120,7 +120,7 @@ class FingerSolver:
             InvalidValue, UnknownName: Bad pulls; nothing has moved.
         """
         begin = time.perf_counter()
-        target = self._checked(pulls)
+        target = self.checked_pulls(pulls)
         walk = self._walk(self._point, self._pulls, target)
         if walk.reached is not None and self.obstacles and np.any(self._point.at.y):
             # Stuck: an obstacle that came where the finger stands, say. From rest there may be a
@@ -141,12 +141,19 @@ class FingerSolver:
         Raises:
             InvalidValue, UnknownName: As for `solve`.
         """
-        target = self._checked(pulls)
+        target = self.checked_pulls(pulls)
         walk = self._walk(self._point, self._pulls, target)
         self._take(walk, target)
         return Move(walk.reached is None, walk.jumped, walk.met)
 
-    def _checked(self, pulls: Mapping[str, float] | Sequence[float] | np.ndarray) -> np.ndarray:
+    def checked_pulls(
+        self, pulls: Mapping[str, float] | Sequence[float] | np.ndarray
+    ) -> np.ndarray:
+        """Return pulls as `solve` takes them as (m,) [m]; nothing is solved.
+
+        Raises:
+            InvalidValue, UnknownName: Bad pulls.
+        """
         target = self.finger.pulls_array(pulls)
         for name, pull, rest in zip(
             self.finger.cable_names, target, self.rest_lengths, strict=True

@@ -3,40 +3,15 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from builtin_interfaces.msg import Time as TimeMessage
-from ccr_msgs.msg import CablePulls, FingerState, Object, ObjectArray, SolveCertificate
+from ccr_msgs.msg import CablePulls, FingerState, SolveCertificate
 from ccr_msgs.msg import Contact as ContactMessage
 from geometry_msgs.msg import Point, PoseArray, Quaternion, TransformStamped, Vector3
 from geometry_msgs.msg import Pose as PoseMessage
-from shape_msgs.msg import SolidPrimitive
 from std_msgs.msg import Header
 
-from ccr_ros.model import (
-    Box,
-    Capsule,
-    Certificate,
-    Contact,
-    ConvexMesh,
-    Finger,
-    FiniteCylinder,
-    InvalidValue,
-    Obstacle,
-    Pose,
-    Solution,
-    Sphere,
-    UnknownName,
-)
-from ccr_ros.viz.recording import SolidObject
-
-_KINDS = {
-    SolidPrimitive.BOX: "box",
-    SolidPrimitive.SPHERE: "sphere",
-    SolidPrimitive.CYLINDER: "cylinder",
-}
-_OTHER_KINDS = {SolidPrimitive.CONE: "CONE", SolidPrimitive.PRISM: "PRISM"}
+from ccr_ros.model import Certificate, Contact, Finger, InvalidValue, Pose, Solution
 
 
 def pulls_from_message(message: CablePulls, finger: Finger) -> np.ndarray:
@@ -58,49 +33,6 @@ def pulls_from_message(message: CablePulls, finger: Finger) -> np.ndarray:
             "pulls", values, f"{len(names)} numbers [m], one per name (got {len(values)})"
         )
     return finger.pulls_array(dict(zip(names, values, strict=True)))
-
-
-def bodies_from_message(message: ObjectArray, gripper_frame: str) -> tuple[SolidObject, ...]:
-    """Return the objects as bodies in the gripper's frame.
-
-    Raises:
-        UnknownName: The frame is not the gripper's, or a primitive is of a kind not known here.
-        InvalidValue: A name is empty or occurs twice, or a size, pose, mass or friction is bad.
-    """
-    if message.header.frame_id not in ("", gripper_frame):
-        raise UnknownName("frame", message.header.frame_id, [gripper_frame])
-    bodies: list[SolidObject] = []
-    for index, item in enumerate(message.objects):
-        place = f"objects[{index}]"
-        try:
-            bodies.append(_body(item))
-        except InvalidValue as error:
-            raise error.located(place) from None
-        if bodies[-1].name in (body.name for body in bodies[:-1]):
-            raise InvalidValue(f"{place}.name", item.name, "unique among the objects")
-    return tuple(bodies)
-
-
-def obstacle_from_body(body: SolidObject) -> Obstacle:
-    """Return the obstacle that a body is to a finger, in the body's frame of reference.
-
-    Raises:
-        InvalidValue: A mesh is not a convex body; says where.
-        MissingPackage: A mesh is given, and scipy is not installed.
-    """
-    position, axis, size = body.pose.position, body.pose.rotation[:, 2], body.dimensions
-    if body.vertices is not None and body.faces is not None:
-        return ConvexMesh(
-            body.vertices, body.faces, position, body.pose.orientation, name=body.name
-        )
-    if body.kind == "sphere":
-        return Sphere(position, size[0], name=body.name)
-    if body.kind == "box":
-        return Box(position, np.array(size), body.pose.orientation, name=body.name)
-    if body.kind == "capsule":
-        half = size[0] / 2 * axis
-        return Capsule(position - half, position + half, size[1], name=body.name)
-    return FiniteCylinder(position, axis, size[0], size[1], name=body.name)
 
 
 def pose_message(position: np.ndarray, orientation: np.ndarray) -> PoseMessage:
@@ -177,20 +109,3 @@ def transform_message(stamp: TimeMessage, parent: str, child: str, pose: Pose) -
     message.transform.translation = Vector3(x=x, y=y, z=z)
     message.transform.rotation = pose_message(pose.position, pose.orientation).orientation
     return message
-
-
-def _body(item: Object) -> SolidObject:
-    kind = _KINDS.get(item.primitive.type)
-    if kind is None:
-        given = _OTHER_KINDS.get(item.primitive.type, item.primitive.type)
-        raise InvalidValue("primitive.type", given, "BOX, SPHERE or CYLINDER")
-    for key in ("mass", "friction"):
-        value = float(getattr(item, key))
-        if not 0.0 <= value < math.inf:
-            raise InvalidValue(key, value, "a finite number >= 0")
-    p, q = item.pose.position, item.pose.orientation
-    try:
-        pose = Pose(np.array([p.x, p.y, p.z]), np.array([q.x, q.y, q.z, q.w]))
-    except InvalidValue as error:
-        raise error.located("pose") from None
-    return SolidObject(item.name, kind, tuple(item.primitive.dimensions), pose)

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
@@ -50,9 +52,7 @@ class FingerDiagnostics:
             "solves": channel.solves,
             "solves not converged": channel.failures,
         }
-        if channel.solve_times:
-            p50, p99 = np.percentile(channel.solve_times, (50, 99)) * 1e3
-            values |= {"solve time p50 [ms]": f"{p50:.3f}", "solve time p99 [ms]": f"{p99:.3f}"}
+        values |= time_values(channel.solve_times)
         if channel.solution is not None:
             certificate = channel.solution.certificate
             values |= {
@@ -63,6 +63,14 @@ class FingerDiagnostics:
                 "KKT residual": f"{certificate.kkt:.2g}",
             }
         return make_status(f"{node_name}: {channel.finger.name}", gripper, level, message, values)
+
+
+def time_values(seconds: Collection[float]) -> dict[str, object]:
+    """Return the key-values of solve times [s]; none of none."""
+    if not seconds:
+        return {}
+    p50, p99 = np.percentile(list(seconds), (50, 99)) * 1e3
+    return {"solve time p50 [ms]": f"{p50:.3f}", "solve time p99 [ms]": f"{p99:.3f}"}
 
 
 def make_status(

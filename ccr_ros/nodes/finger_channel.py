@@ -6,7 +6,7 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from builtin_interfaces.msg import Time as TimeMessage
@@ -18,26 +18,30 @@ from tf2_ros import TransformBroadcaster
 
 from ccr_ros.model import CcrError, FingerSolver, MountedFinger, Obstacle, Solution, SolverSettings
 
+from .backlog import Backlog
 from .conversions import pose_array, pulls_from_message, state_message, transform_message
 from .frames import FingerFrames
 from .qos import COMMAND_QUEUE, LATCHED
 
 _TIMES_KEPT = 1000  # solve times, for the percentiles
 _WARN_EVERY = 2.0  # s
-_MOST_LOOKING = 0.005  # s that taking in a backlog may delay a solve by
 _SAME = 1e-7  # m; pulls as near as that to those of the pose have this pose
 
 
 @dataclass(frozen=True)
-class _Task:
-    """Pulls to be solved [m], and the time they are of."""
+class Task:
+    """Pulls to be solved [m], the time they are of, and when they came [s, monotonic]."""
 
     pulls: np.ndarray
     stamp: TimeMessage
+    arrived: float = field(default_factory=time.monotonic)
 
 
 class FingerChannel:
     """Keeps the newest pulls of one finger, solves them when told to, publishes the pose.
+
+    `solve` does so for the finger alone; who solves it with others calls `begin`, then `show` or
+    `fail`.
 
     Receiving only stores, so that many messages cost one solve. Bad pulls are refused when they
     come and change nothing else.
@@ -75,16 +79,14 @@ class FingerChannel:
         self._wake = wake
         now = node.get_clock().now().to_msg()
         # Shown at once: the finger at rest.
-        self._wanted = _Task(np.zeros(len(self.finger.cables)), now)
+        self._wanted = Task(np.zeros(len(self.finger.cables)), now)
         self._pose_stamp = now
-        self._accepted = self._wanted  # the last that the solver took
+        self.accepted = self._wanted  # the last that the solver took
         self._refusal = ""  # why the newest message was refused
         self._unsolved = True  # whether there is something to solve
-        self._new_scene = True  # whether the obstacles are newer than the pose
         self._waiting = False  # whether _wanted came as a message and is not solved yet
-        self._seen = self._dropped_told = 0
-        self._looking_since: float | None = None  # when the backlog was first seen
-        self._backlog = False  # whether the last look found newer pulls
+        self._dropped_told = 0
+        self._backlog = Backlog()
 
         name = self.finger.name
         self._backbone = node.create_publisher(PoseArray, f"{name}/backbone", LATCHED)
@@ -115,73 +117,68 @@ class FingerChannel:
 
     def solve_again(self, stamp: TimeMessage) -> None:
         """Ask for a new solve of the wanted pulls, because the obstacles are new at this time."""
-        self._accepted = _Task(self._accepted.pulls, stamp)
         if not self._waiting:
-            self._wanted = _Task(self._wanted.pulls, stamp)
-        self._unsolved = self._new_scene = True
+            self._wanted = Task(self._wanted.pulls, stamp)
+        self._unsolved = True
 
     def settled(self) -> bool:
-        """Tell whether no newer pulls have come in since the last look, which this one becomes.
-
-        An executor hands over one message per turn, so a backlog shows as one more at every look.
-        It is let in before a solve, but not for ever.
-        """
-        quiet = self._seen == self.received
-        self._backlog = not quiet
-        self._seen = self.received
-        now = time.monotonic()
-        if self._looking_since is None:
-            self._looking_since = now
-        if quiet or now - self._looking_since > _MOST_LOOKING:
-            self._looking_since = None
-        return self._looking_since is None
+        """Tell whether no newer pulls have come in since the last look, which this one becomes."""
+        return self._backlog.settled(self.received)
 
     def solve(self) -> None:
         """Solve the wanted pulls and publish: the new pose, or the last good one as stale."""
-        task = self._wanted
-        self._unsolved = self._waiting = False
-        self._warn_of_backlog()
-        try:
-            solution = self.solver.solve(task.pulls)
-        except CcrError as error:  # a pull beyond its cable's own limit
-            self._wanted = self._accepted
-            self._unsolved = self._new_scene
-            self._refuse(error)
-            return
-        self._accepted, self._new_scene = task, False
-        self.solves += 1
+        task = self.begin()
+        solution = self.solver.solve(task.pulls)
         self.solve_times.append(solution.certificate.solve_time)
         if solution.certificate.converged:
-            self.fault = self._refusal
-            self.solution = solution
-            self._pose_stamp = task.stamp
-            self._publish_pose(solution)
+            self.show(task, solution)
         else:
-            self.failures += 1
-            failure = f"not converged: {solution.certificate.message}"
-            self.fault = self._refusal or failure
-            self._log.warning(
-                f"{failure} (the last good pose stays)", throttle_duration_sec=_WARN_EVERY
-            )
+            self.fail(task, solution.certificate.message)
+
+    def begin(self) -> Task:
+        """Take the wanted pulls to solve them; `show` or `fail` comes next."""
+        self._unsolved = self._waiting = False
+        self._warn_of_backlog()
+        self.solves += 1
+        return self._wanted
+
+    def show(self, task: Task, solution: Solution) -> None:
+        """Publish the pose that pulls lead to."""
+        self.accepted = task
+        self.fault = self._refusal
+        self.solution = solution
+        self._pose_stamp = task.stamp
+        self._publish_pose(solution)
+        self._publish_state()
+
+    def fail(self, task: Task, reason: str) -> None:
+        """Publish the last good pose as stale, as none was found for pulls."""
+        self.accepted = task
+        self.failures += 1
+        failure = f"not converged: {reason}"
+        self.fault = self._refusal or failure
+        self._log.warning(
+            f"{failure} (the last good pose stays)", throttle_duration_sec=_WARN_EVERY
+        )
         self._publish_state()
 
     def _receive(self, message: CablePulls) -> None:
         self.received += 1
         try:
-            pulls = pulls_from_message(message, self.finger)
+            pulls = self.solver.checked_pulls(pulls_from_message(message, self.finger))
         except CcrError as error:
             self._refuse(error)
             return
         stamp = self._stamp(message.header.stamp)
         if self.solution is not None and self._shows(self.solution, pulls):
-            self._show_again(self.solution, stamp)
+            self._show_again(self.solution, Task(pulls, stamp))
             return
         if self._waiting:
             self.dropped += 1
-        elif not self._backlog:
-            self._seen = self.received  # a single message is solved at the first look
+        elif not self._backlog.growing:
+            self._backlog.mark_seen(self.received)  # a single message: solved at the first look
         self._refusal = ""
-        self._wanted = _Task(pulls, stamp)
+        self._wanted = Task(pulls, stamp)
         self._unsolved = self._waiting = True
         self._wake()
 
@@ -191,12 +188,13 @@ class FingerChannel:
             return False
         return bool(np.all(np.abs(pulls - solution.pulls) <= _SAME))
 
-    def _show_again(self, solution: Solution, stamp: TimeMessage) -> None:
+    def _show_again(self, solution: Solution, task: Task) -> None:
         """Publish the pose for newer pulls that are the same, as those of a gripper that holds."""
-        self._seen = self.received
-        self._pose_stamp = stamp
+        self._backlog.mark_seen(self.received)
+        self.accepted, self._pose_stamp = task, task.stamp
         self._publish_pose(solution)
         self._publish_state()
+        self._wake()  # the object's state, too, is as new as they are
 
     def _refuse(self, error: CcrError) -> None:
         self.refused += 1

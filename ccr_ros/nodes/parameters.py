@@ -5,9 +5,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
 from rclpy.node import Node
 
-from ccr_ros.model import Gripper, InvalidValue, SolverSettings, load_gripper
+from ccr_ros.grasp.statics.body import GRAVITY
+from ccr_ros.model import (
+    Gripper,
+    InvalidValue,
+    SolverSettings,
+    UnknownName,
+    checks,
+    load_gripper,
+)
 from ccr_ros.resources import find_config
 
 from .declarations import Declarations
@@ -15,6 +24,8 @@ from .frames import prefix_of
 
 MARKERS = "markers"
 MARKER_RATE = "marker_rate"
+FINGERS, GRIPPER = "fingers", "gripper"
+MODES = (FINGERS, GRIPPER)
 
 
 @dataclass(frozen=True)
@@ -26,12 +37,20 @@ class SolverParameters:
         settings: How its fingers are solved.
         frame_prefix: Before every frame name but the gripper's own.
         gripper_frame: The gripper's frame.
+        mode: ``fingers``, each by itself, or ``gripper``: all and the object together.
+        object_name: Of the object in mode gripper; empty: the one with a mass, or held.
+        gravity: (3,) [m/s^2] in the gripper's frame.
+        grasp_state_rate: Most messages per second [Hz].
     """
 
     gripper: Gripper
     settings: SolverSettings
     frame_prefix: str
     gripper_frame: str
+    mode: str
+    object_name: str
+    gravity: np.ndarray
+    grasp_state_rate: float
 
 
 def declare(node: Node) -> SolverParameters:
@@ -80,6 +99,33 @@ def declare(node: Node) -> SolverParameters:
         "Frame the fingers stand in and objects are given in; its default has the frame_prefix.",
         "not empty, no '/' at the start",
     )
+    mode = parameters.fixed(
+        "mode",
+        FINGERS,
+        "fingers: each finger by itself, objects stand still; gripper: all fingers and the object"
+        " in one equilibrium, in which they may carry it.",
+        "fingers or gripper",
+    )
+    object_name = parameters.fixed(
+        "object",
+        "",
+        "Name of the object in mode gripper, among those on the topic objects; empty: the only one"
+        " that has a mass or is held.",
+    )
+    gravity = parameters.fixed(
+        "gravity",
+        GRAVITY.tolist(),
+        "Gravity in the gripper's frame [m/s^2], in mode gripper; the default is for a gripper"
+        " that points up.",
+        "3 numbers",
+    )
+    grasp_state_rate = parameters.fixed(
+        "grasp_state_rate",
+        10.0,
+        "Most GraspState messages per second [Hz], in mode gripper; none are sent while nothing"
+        " comes in.",
+        (0.5, 100.0),
+    )
     parameters.live(MARKERS, True, "Publish markers for RViz and the like.")
     parameters.live(
         MARKER_RATE,
@@ -87,6 +133,8 @@ def declare(node: Node) -> SolverParameters:
         "Most marker messages per second [Hz]; none are sent while nothing moves.",
         (0.1, 100.0),
     )
+    if mode not in MODES:
+        raise UnknownName("mode", mode, MODES)
     return SolverParameters(
         gripper=load_gripper(find_config(gripper_file)),
         settings=SolverSettings(
@@ -94,6 +142,10 @@ def declare(node: Node) -> SolverParameters:
         ),
         frame_prefix=_frame("frame_prefix", prefix, may_be_empty=True),
         gripper_frame=_frame("gripper_frame", gripper_frame, may_be_empty=False),
+        mode=mode,
+        object_name=object_name,
+        gravity=checks.vector("gravity", list(gravity), 3, unit="m/s^2", largest=1e3),
+        grasp_state_rate=grasp_state_rate,
     )
 
 

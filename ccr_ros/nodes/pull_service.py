@@ -34,15 +34,21 @@ class PullService:
         node: The node to make the service on.
         fingers: Its fingers.
         wake: Called when there is something to `work` on.
+        prepare: Called with a finger before a request about it; may refuse with a CcrError.
     """
 
     def __init__(
-        self, node: Node, fingers: Sequence[FingerChannel], wake: Callable[[], None]
+        self,
+        node: Node,
+        fingers: Sequence[FingerChannel],
+        wake: Callable[[], None],
+        prepare: Callable[[FingerChannel], None] | None = None,
     ) -> None:
         self._fingers = {channel.finger.name: channel for channel in fingers}
         self._planners: dict[str, PullPlanner] = {}
         self._log = node.get_logger().get_child("solve_pulls")
         self._wake = wake
+        self._prepare = prepare
         self._waiting: deque[tuple[SolvePulls.Request, Future]] = deque()
         self._steps: Generator[None, None, PullSolution] | None = None  # of the first one waiting
         # A group of its own: while an answer is waited for the node's other callbacks go on.
@@ -95,6 +101,8 @@ class PullService:
         channel = self._fingers[request.finger]
         target = _target(request, channel)
         limits = _limits(request, channel)
+        if self._prepare is not None:
+            self._prepare(channel)
         planner = self._planners.get(request.finger)
         if planner is None:
             planner = self._planners[request.finger] = PullPlanner(channel.solver)

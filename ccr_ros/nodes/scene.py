@@ -8,10 +8,10 @@ from collections.abc import Sequence
 from ccr_msgs.msg import ObjectArray
 
 from ccr_ros.model import CcrError, InvalidValue
-from ccr_ros.viz.recording import SolidObject
 
-from .conversions import bodies_from_message, obstacle_from_body
 from .finger_channel import FingerChannel
+from .grasp_channel import GraspChannel
+from .object_conversions import SceneObject, objects_from_message
 
 
 class ObjectScene:
@@ -20,53 +20,76 @@ class ObjectScene:
     Args:
         fingers: The fingers.
         frame: The gripper's frame, in which objects are given.
+        grasp: What takes the object in hand, which then is no obstacle; None: nothing does.
     """
 
-    def __init__(self, fingers: Sequence[FingerChannel], frame: str) -> None:
+    def __init__(
+        self, fingers: Sequence[FingerChannel], frame: str, grasp: GraspChannel | None = None
+    ) -> None:
         self._fingers = tuple(fingers)
         self._frame = frame
+        self._grasp = grasp
         self._own = [finger.finger.obstacles for finger in self._fingers]
-        self.bodies: tuple[SolidObject, ...] = ()
+        self._in_hand: SceneObject | None = None
+        self.objects: tuple[SceneObject, ...] = ()
         self.fault = ""  # why the newest message was refused
 
     def take(self, message: ObjectArray) -> bool:
-        """Replace all objects by a message's; return whether anything is different now.
+        """Replace all objects by a message's; return whether there is something to be solved.
 
         Raises:
             CcrError: The message is not valid, or an object overlaps a finger's base; the
                 objects are as they were.
         """
         try:
-            bodies = bodies_from_message(message, self._frame)
-            changed = list(map(_key, bodies)) != list(map(_key, self.bodies))
-            if changed:
-                self._give(bodies)
+            objects = objects_from_message(message, self._frame, self.objects)
+            self._check_names(objects)
+            due = self._put(objects)
         except CcrError as error:
             self.fault = f"objects refused: {error}"
             raise
         self.fault = ""
-        self.bodies = bodies
-        return changed
+        self.objects = objects
+        return due
 
-    def _give(self, bodies: tuple[SolidObject, ...]) -> None:
+    def _check_names(self, objects: Sequence[SceneObject]) -> None:
+        for finger, own in zip(self._fingers, self._own, strict=True):
+            for item in objects:
+                if item.name in (obstacle.name for obstacle in own):
+                    allowed = f"unlike the obstacles in the file of finger {finger.finger.name!r}"
+                    raise InvalidValue("objects.name", item.name, allowed)
+
+    def _put(self, objects: Sequence[SceneObject]) -> bool:
+        in_hand = None if self._grasp is None else self._grasp.choose(objects)
+        before = [o for o in self.objects if o is not self._in_hand]
+        others = [o for o in objects if o is not in_hand]
+        changed = [o.key for o in others] != [o.key for o in before]
+        changed |= _name(in_hand) != _name(self._in_hand)
+        if changed:
+            self._give(others)
+        due = False
+        if self._grasp is not None:
+            try:
+                due = self._grasp.take(in_hand, changed)
+            except CcrError:
+                if changed:
+                    self._give(before)
+                raise
+        self._in_hand = in_hand
+        return changed or due
+
+    def _give(self, objects: Sequence[SceneObject]) -> None:
         before = [finger.solver.obstacles for finger in self._fingers]
         try:
             for finger, own in zip(self._fingers, self._own, strict=True):
-                for body in bodies:
-                    if body.name in (obstacle.name for obstacle in own):
-                        allowed = (
-                            f"unlike the obstacles in the file of finger {finger.finger.name!r}"
-                        )
-                        raise InvalidValue("objects.name", body.name, allowed)
                 to_finger = finger.base.inverse()
-                objects = [obstacle_from_body(body).moved(to_finger) for body in bodies]
-                finger.set_obstacles((*own, *objects))
+                found = [item.obstacle().moved(to_finger) for item in objects]
+                finger.set_obstacles((*own, *found))
         except CcrError:
             for finger, obstacles in zip(self._fingers, before, strict=True):
                 finger.set_obstacles(obstacles)
             raise
 
 
-def _key(body: SolidObject) -> tuple[object, ...]:
-    position, orientation = body.pose.position.tolist(), body.pose.orientation.tolist()
-    return body.name, body.shape, position, orientation
+def _name(item: SceneObject | None) -> str | None:
+    return None if item is None else item.name

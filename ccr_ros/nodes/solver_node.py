@@ -29,6 +29,8 @@ from .conversions import transform_message
 from .diagnostics import FingerDiagnostics, make_status
 from .finger_channel import FingerChannel
 from .frames import FingerFrames
+from .grasp_channel import GraspChannel
+from .grasp_diagnostics import grasp_status, grasp_verdict
 from .pull_service import PullService
 from .qos import COMMAND, DIAGNOSTICS, LATCHED
 from .scene import ObjectScene
@@ -83,10 +85,14 @@ class SolverNode(Node):
         )
 
         self._objects_message: ObjectArray | None = None  # the newest, not looked at yet
-        self._objects = ObjectScene(self._fingers, fixed.gripper_frame)
+        self._grasp: GraspChannel | None = None
+        if fixed.mode == parameters.GRIPPER:
+            self._grasp = GraspChannel(self, self._fingers, fixed, broadcaster, self._steady)
+        self._objects = ObjectScene(self._fingers, fixed.gripper_frame, self._grasp)
         self.create_subscription(ObjectArray, "objects", self._receive_objects, COMMAND)
 
-        self._pulls = PullService(self, self._fingers, self._wake.trigger)
+        prepare = None if self._grasp is None else self._grasp.prepare
+        self._pulls = PullService(self, self._fingers, self._wake.trigger, prepare)
 
         self._markers = self.create_publisher(MarkerArray, "markers", LATCHED)
         self._scene = SceneMarkers()
@@ -106,7 +112,8 @@ class SolverNode(Node):
     # The worker
 
     def _work(self) -> None:
-        """Take new objects in, solve one finger; come back for more when others were served.
+        """Take new objects in, solve one finger, or all at once where they have an object in hand;
+        come back for more when others were served.
 
         A request for pulls is worked on besides, for the time of one solve.
         """
@@ -114,6 +121,8 @@ class SolverNode(Node):
         if message is not None:
             self._take_objects(message)
         self._solve_next()
+        if self._grasp is not None:
+            self._grasp.tell()
         self._report_change()
         self._pulls.work()
         unsolved = self._objects_message is not None or any(c.unsolved for c in self._fingers)
@@ -121,6 +130,10 @@ class SolverNode(Node):
             self._wake.trigger()
 
     def _solve_next(self) -> None:
+        if self._grasp is not None and self._grasp.active:
+            if self._grasp.turn():
+                self._scene_changed()
+            return
         for _ in self._fingers:
             channel = self._channels[0]
             if channel.unsolved and not channel.settled():
@@ -168,12 +181,16 @@ class SolverNode(Node):
 
     def _publish_markers(self) -> None:
         self._marker_timer.cancel()
+        grasp = self._grasp
         views = [
             FingerView(c.solution, c.frames.base, c.stale)
             for c in self._fingers
             if c.solution is not None
         ]
-        self._markers.publish(self._scene.message(views, self._objects.bodies, self._gripper_frame))
+        objects = self._objects.objects
+        bodies = [item.solid for item in objects] if grasp is None else grasp.seen(objects)
+        contacts = () if grasp is None else grasp.contacts
+        self._markers.publish(self._scene.message(views, bodies, self._gripper_frame, contacts))
 
     def _parameters_changed(self, changed: Sequence[Parameter]) -> None:
         names = {parameter.name for parameter in changed}
@@ -190,6 +207,8 @@ class SolverNode(Node):
 
     def _report_change(self) -> None:
         levels = (*(health.verdict()[0] for health in self._health), bool(self._objects.fault))
+        if self._grasp is not None:
+            levels = (*levels, grasp_verdict(self._grasp))
         if levels != self._levels:
             self._levels = levels
             self._publish_diagnostics()
@@ -210,9 +229,11 @@ class SolverNode(Node):
                 self._gripper_name,
                 DiagnosticStatus.ERROR if fault else DiagnosticStatus.OK,
                 fault or "ok",
-                {"objects": len(self._objects.bodies)},
+                {"objects": len(self._objects.objects)},
             )
         )
+        if self._grasp is not None:
+            statuses.append(grasp_status(self._grasp, name, self._gripper_name))
         header = Header(stamp=self.get_clock().now().to_msg())
         self._diagnostics.publish(DiagnosticArray(header=header, status=statuses))
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from geometry_msgs.msg import Point, Pose, Quaternion, Vector3
@@ -21,6 +21,9 @@ from visualization_msgs.msg import Marker, MarkerArray
 from ..model import Contact, Finger, Solution
 from .shapes import triangles
 from .solids import SolidObject
+
+if TYPE_CHECKING:
+    from ..grasp.statics import ObjectContact
 
 DISK_THICKNESS = 0.002  # m
 DISK_RIM = 0.0015  # m, of the disk outside its holes
@@ -39,6 +42,7 @@ SLACK = (0.55, 0.55, 0.55, 1.0)
 CALM, TENSE = (0.15, 0.65, 0.85), (0.95, 0.20, 0.10)
 CONTACT = (0.95, 0.10, 0.55, 1.0)
 FORCE = (0.95, 0.60, 0.05, 1.0)
+STICK, SLIP = (0.20, 0.80, 0.70, 1.0), (0.95, 0.85, 0.20, 1.0)  # friction of contacts that do
 OBJECT = (0.30, 0.75, 0.35, 0.45)
 OBSTACLE = (0.60, 0.60, 0.60, 0.35)
 STALE_ALPHA = 0.35  # a pose that is not that of the newest pulls is see-through
@@ -71,7 +75,11 @@ class SceneMarkers:
         self._fingers: dict[str, tuple[FingerView, list[Marker]]] = {}
 
     def message(
-        self, fingers: Iterable[FingerView], objects: Sequence[SolidObject], gripper_frame: str
+        self,
+        fingers: Iterable[FingerView],
+        objects: Sequence[SolidObject],
+        gripper_frame: str,
+        grasp: Sequence[ObjectContact] = (),
     ) -> MarkerArray:
         """Return the whole scene.
 
@@ -79,10 +87,21 @@ class SceneMarkers:
             fingers: The fingers that have a pose.
             objects: In the gripper's frame.
             gripper_frame: tf frame of the gripper.
+            grasp: Contacts of which friction is shown, in the gripper's frame.
         """
         markers: list[Marker] = []
+        known = {}
         for view in fingers:
             markers += self._finger(view)
+            known[view.solution.finger.name] = view.solution.finger
+        rubbing = {
+            (c.finger, c.disk, c.point, c.cable): c
+            for c in grasp
+            if c.finger in known and np.any(c.friction_force)
+        }
+        markers += self._slotted(
+            "friction", gripper_frame, rubbing, lambda c: _friction_arrow(c, known[c.finger])
+        )
         markers += self._bodies("objects", gripper_frame, objects, OBJECT)
         return MarkerArray(markers=markers)
 
@@ -218,10 +237,25 @@ def _contact_point(contact: Contact) -> Marker:
 
 def _force_arrow(contact: Contact, finger: Finger) -> Marker:
     """Return the force on the finger, as an arrow from where it acts."""
-    size = ARROW_PER_FORCE * contact.force / _force_unit(finger)
-    length = finger.length * min(size, LONGEST_ARROW)
-    marker = Marker(type=Marker.ARROW, color=_colour(FORCE))
-    marker.points = _points([contact.position, contact.position + length * contact.normal])
+    return _arrow(contact.position, contact.force * contact.normal, finger, FORCE)
+
+
+def _friction_arrow(contact: ObjectContact, finger: Finger) -> Marker:
+    """Return the friction on the finger, on the scale of the other forces."""
+    colour = SLIP if contact.status == "slip" else STICK
+    return _arrow(contact.position, contact.friction_force, finger, colour)
+
+
+def _arrow(
+    position: np.ndarray,
+    force: np.ndarray,
+    finger: Finger,
+    colour: tuple[float, float, float, float],
+) -> Marker:
+    size = float(np.linalg.norm(force))
+    length = finger.length * min(ARROW_PER_FORCE * size / _force_unit(finger), LONGEST_ARROW)
+    marker = Marker(type=Marker.ARROW, color=_colour(colour))
+    marker.points = _points([position, position + (length / size if size else 0.0) * force])
     marker.scale = Vector3(x=CONTACT_SIZE / 3, y=CONTACT_SIZE * 0.7, z=0.0)
     return marker
 

@@ -18,8 +18,8 @@ from ccr_ros.model import (
     Pose,
     Sphere,
 )
-from ccr_ros.nodes.conversions import bodies_from_message, obstacle_from_body
 from ccr_ros.nodes.frames import FingerFrames, prefix_of
+from ccr_ros.nodes.object_conversions import objects_from_message, obstacle_from_body
 from ccr_ros.viz.solids import SolidObject
 
 # A quarter turn about x: the body's z points along -y.
@@ -31,8 +31,8 @@ def obstacle(kind, dimensions):
     item.primitive = SolidPrimitive(type=kind, dimensions=dimensions)
     turn = item.pose.orientation
     turn.x, turn.y, turn.z, turn.w = TURN
-    (body,) = bodies_from_message(objects(item), "base")
-    return obstacle_from_body(body)
+    (found,) = objects_from_message(objects(item), "base")
+    return found.obstacle()
 
 
 def test_sphere():

@@ -94,11 +94,12 @@ def type_text(kind):
     return f"{package}/{module}/{kind.__name__}"
 
 
-def documented(node, direction):
-    for row in table(node, "topic"):
+def documented(node, direction, first_column="topic"):
+    for row in table(node, first_column):
         if row["direction"] != direction:
             continue
-        name = row["topic"] if row["topic"].startswith("/") else f"/gripper/{row['topic']}"
+        topic = row[first_column]
+        name = topic if topic.startswith("/") else f"/gripper/{topic}"
         for finger, cables in fingers_of(node).items():
             for cable in cables:
                 full = name.replace("<finger>", finger).replace("<cable>", cable)
@@ -114,6 +115,18 @@ def test_topics(node, direction):
         if e.topic_name not in NOT_OURS
     }
     assert found == dict(documented(node.get_name(), direction))
+
+
+def test_topics_of_mode_gripper(start, small_gripper):
+    def publishers(node):
+        found = {e.topic_name: (type_text(e.msg_type), qos_text(e.qos_profile))
+                 for e in node.publishers}  # fmt: skip
+        return {name: found[name] for name in found if name not in NOT_OURS}
+
+    node = start(gripper_file=small_gripper, mode="gripper")
+    of_both = dict(documented("solver_node", "out"))
+    more = dict(documented("solver_node", "out", "topic in mode gripper"))
+    assert publishers(node) == {**of_both, **more} and len(more) == 2
 
 
 def services(node):

@@ -17,10 +17,14 @@ OWN = (
     "time_limit",
     "frame_prefix",
     "gripper_frame",
+    "mode",
+    "object",
+    "gravity",
+    "grasp_state_rate",
     "markers",
     "marker_rate",
 )
-FIXED = OWN[:6]
+FIXED = OWN[:10]
 
 
 def test_every_parameter_is_described(start):

@@ -108,6 +108,7 @@ def test_a_node_is_given_its_arguments():
         (["none.yaml"], "none.yaml"),
         (["--without", "node"], "unknown node 'node'"),
         (["--driver", "magic"], "unknown driver 'magic'; valid: loopback"),
+        (["--mode", "hand"], "unknown mode 'hand'; valid: fingers, gripper"),
         (["--params", "none.yaml"], "there is no such file"),
         (["helical"], "gripper file is wanted"),
         (["--servos", "nowhere"], "nowhere"),
