@@ -21,6 +21,7 @@ from ..model.obstacles import (
     Plane,
     Sphere,
 )
+from ..model.obstacles.triangles import turned_outward
 from ..model.rotation import Pose, quaternion_from_matrix
 
 DIMENSIONS = {
@@ -43,8 +44,8 @@ class SolidObject:
             capsule (length between the centres of its half balls, radius), along z; mesh ().
         pose: Of the body's centre, or of a mesh's frame, in the gripper's frame.
         vertices: (V, 3) of a mesh, in its frame [m]; else None.
-        faces: (F, 3) numbers of the vertices of a mesh's triangles, counter-clockwise as seen
-            from outside; else None.
+        faces: (F, 3) numbers of the vertices of a (convex) mesh's triangles; they are put
+            counter-clockwise as seen from outside. Else None.
     """
 
     name: str
@@ -68,6 +69,7 @@ class SolidObject:
             faces = checks.index_rows("faces", self.faces, 3, len(vertices))
             if not len(faces):
                 raise InvalidValue("faces", [], "at least one triangle")
+            faces = turned_outward(vertices, faces, vertices[np.unique(faces)].mean(axis=0))
             for name, numbers in (("vertices", vertices), ("faces", faces)):
                 numbers.setflags(write=False)
                 object.__setattr__(self, name, numbers)

@@ -70,7 +70,7 @@ def test_bodies_without_a_primitive():
     on_face = pose.points(np.array([[0.03, 0.03, 0.0]]))
     np.testing.assert_allclose(mesh.signed_distance(on_face), 0, atol=1e-12)
     with pytest.raises(InvalidValue, match="watertight"):
-        obstacle_from_body(replace(body, faces=faces[:3]))
+        obstacle_from_body(replace(body, faces=[*faces[:3], faces[0]]))
 
 
 def test_an_unknown_kind_is_named():

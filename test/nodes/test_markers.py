@@ -142,7 +142,7 @@ def test_what_viewers_have_no_marker_for_is_drawn_as_triangles(solution):
         assert (marker.pose.position.x, marker.pose.position.z) == (0.1, 0.2)
         assert 0.0 < marker.color.a < 1.0 and len(marker.points) % 3 == 0
     points = np.array([[p.x, p.y, p.z] for p in wedge_shown.points])
-    np.testing.assert_allclose(points, corners[np.ravel(faces)])
+    np.testing.assert_allclose(points, corners[np.ravel(mesh.faces)])
     points = np.array([[p.x, p.y, p.z] for p in pill_shown.points])
     assert len(points) < 3000
     capsule = Capsule([0, 0, -0.03], [0, 0, 0.03], 0.02)

@@ -28,6 +28,7 @@ from ccr_ros.viz.solids import SolidObject
 BASE = Pose(np.array([0.1, 0, 0]), np.array([0, 0, np.sqrt(0.5), np.sqrt(0.5)]))
 AXIS = np.array([0.6, 0.0, 0.8])
 WEDGE = 0.1 * np.vstack([np.zeros((1, 3)), np.eye(3)])
+FACES = list(combinations(range(4), 3))
 SMALL = 1e-9  # m; a rounding that drawings, whose edges are sharp, do not show
 
 SHAPES = {
@@ -68,6 +69,13 @@ VOLUMES = {
 }
 
 
+def test_the_faces_of_a_mesh_are_turned_outward() -> None:
+    for faces in (FACES, [face[::-1] for face in FACES]):
+        cut = triangles(SolidObject("wedge", "mesh", (), BASE, WEDGE, faces))
+        normals = np.cross(cut[:, 1] - cut[:, 0], cut[:, 2] - cut[:, 0])
+        assert (np.einsum("ij,ij->i", normals, cut[:, 0] - WEDGE.mean(axis=0)) > 0).all()
+
+
 def test_infinite_obstacles_are_shown_in_part() -> None:
     for axis in ([0, 1, 0], [1, 0, 0], [0, 0, -1], [0.6, 0, 0.8]):
         rod = SolidObject.from_obstacle(Cylinder(np.zeros(3), axis, 0.01), extent=0.2)
@@ -85,9 +93,6 @@ class Blob(Obstacle):
 def test_what_cannot_be_shown_is_told() -> None:
     with pytest.raises(InvalidValue, match="Blob"):
         SolidObject.from_obstacle(Blob())
-
-
-FACES = list(combinations(range(4), 3))
 
 
 @pytest.mark.parametrize(
