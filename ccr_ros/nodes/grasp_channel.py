@@ -27,6 +27,7 @@ from .object_conversions import SceneObject
 from .pace import Pace
 from .parameters import SolverParameters
 from .qos import LATCHED
+from .quality_watch import QualityWatch
 
 _TIMES_KEPT = 1000  # solve times, for the percentiles
 _WARN_EVERY = 2.0  # s
@@ -42,7 +43,7 @@ class GraspChannel:
         fingers: Its fingers, in the gripper's order.
         fixed: Its parameters.
         broadcaster: For the object's transform.
-        clock: Of the rate of `grasp_state`.
+        clock: Of the rates of what is told.
     """
 
     def __init__(
@@ -69,7 +70,9 @@ class GraspChannel:
         self.solves = self.failures = 0
         self._state = node.create_publisher(GraspState, "grasp_state", LATCHED)
         self._pose = node.create_publisher(PoseStamped, "object_pose", LATCHED)
+        self._quality = QualityWatch(fixed.gravity, self._log)
         self._pace = Pace(node, fixed.grasp_state_rate, clock, self._publish_state)
+        self._slow_pace = Pace(node, fixed.quality_rate, clock, self._measure)
 
     @property
     def active(self) -> bool:
@@ -159,6 +162,7 @@ class GraspChannel:
                 for c in self._fingers
             ]
             live = LiveGrasp(fingers, body, self._fixed.settings, self._fixed.gravity, place)
+            self._quality.forget()
             self._stability, due = None, True
         due |= live.want(item.pose, item.mass, item.held)
         self._live, self._object = live, item
@@ -242,6 +246,7 @@ class GraspChannel:
         if not stale:
             self._stamp = newest.stamp
             self._publish_pose()
+        self._slow_pace.changed()
         self._pace.changed()
 
     @property
@@ -261,6 +266,11 @@ class GraspChannel:
             transform_message(header.stamp, header.frame_id, self._frame(self._object), pose)
         )
 
+    def _measure(self) -> None:
+        if self._live is not None and self._live.solution is not None:
+            self._quality.measure(self._live.solution)
+            self._pace.changed()
+
     def _publish_state(self) -> None:
         header = Header(stamp=self._stamp, frame_id=self._fixed.gripper_frame)
         live = self._live
@@ -271,8 +281,9 @@ class GraspChannel:
         else:
             self._judge(live.solution)
             message = self.fault or self.doubt
+            quality = self._quality.message(live.solution)
             self._state.publish(
-                grasp_message(header, live.solution, live.held, self._stale, message)
+                grasp_message(header, live.solution, quality, live.held, self._stale, message)
             )
 
     def _frame(self, item: SceneObject) -> str:

@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from ccr_msgs.msg import GraspContact, GraspQuality, GraspState
 from geometry_msgs.msg import Point, Vector3, Wrench
@@ -13,16 +11,23 @@ from std_msgs.msg import Header
 from ccr_ros.grasp.statics import Body, GraspSolution, ObjectContact
 
 from .conversions import pose_message
+from .quality_watch import unknown_quality
 
 
 def grasp_message(
-    header: Header, solution: GraspSolution, held: bool, stale: bool, message: str
+    header: Header,
+    solution: GraspSolution,
+    quality: GraspQuality,
+    held: bool,
+    stale: bool,
+    message: str,
 ) -> GraspState:
     """Return the state of the object.
 
     Args:
         header: With the gripper's frame, and the stamp of what the solution answers to.
         solution: The last good one.
+        quality: Of it, as far as it is known.
         held: Whether the fingers carry the object.
         stale: Whether the solution is out of date.
         message: What is not as wanted.
@@ -38,7 +43,7 @@ def grasp_message(
         forces_are=solution.fingers[0].finger.forces_are,
         contacts=[grasp_contact(c, body.pose.position) for c in solution.contacts],
         net=_wrench(solution.net_force, solution.net_moment),
-        quality=_quality(solution),
+        quality=quality,
         stable=bool(solution.stable),
         softest=solution.softest,
         smallest_eigenvalue=float(solution.smallest_eigenvalue),
@@ -57,7 +62,7 @@ def unsolved_object(header: Header, body: Body, message: str) -> GraspState:
         pose=pose_message(body.pose.position, body.pose.orientation),
         mass=float(body.mass),
         friction=float(body.friction),
-        quality=_unknown(),
+        quality=unknown_quality(),
         stale=True,
         message=message,
     )
@@ -65,7 +70,7 @@ def unsolved_object(header: Header, body: Body, message: str) -> GraspState:
 
 def no_object(header: Header) -> GraspState:
     """Return the state where there is no object."""
-    return GraspState(header=header, quality=_unknown())
+    return GraspState(header=header, quality=unknown_quality())
 
 
 def grasp_contact(contact: ObjectContact, centre: np.ndarray) -> GraspContact:
@@ -85,14 +90,6 @@ def grasp_contact(contact: ObjectContact, centre: np.ndarray) -> GraspContact:
         margin=float(contact.margin),
         wrench=_wrench(on_object, np.cross(contact.position - centre, on_object)),
     )
-
-
-def _quality(solution: GraspSolution) -> GraspQuality:
-    return _unknown()
-
-
-def _unknown() -> GraspQuality:
-    return GraspQuality(margin=math.nan, epsilon=math.nan, payload=math.nan)
 
 
 def _wrench(force: np.ndarray, moment: np.ndarray) -> Wrench:

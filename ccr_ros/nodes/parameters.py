@@ -41,6 +41,7 @@ class SolverParameters:
         object_name: Of the object in mode gripper; empty: the one with a mass, or held.
         gravity: (3,) [m/s^2] in the gripper's frame.
         grasp_state_rate: Most messages per second [Hz].
+        quality_rate: Most measurements of the grasp's quality per second [Hz].
     """
 
     gripper: Gripper
@@ -51,6 +52,7 @@ class SolverParameters:
     object_name: str
     gravity: np.ndarray
     grasp_state_rate: float
+    quality_rate: float
 
 
 def declare(node: Node) -> SolverParameters:
@@ -126,6 +128,13 @@ def declare(node: Node) -> SolverParameters:
         " comes in.",
         (0.5, 100.0),
     )
+    quality_rate = parameters.fixed(
+        "quality_rate",
+        2.0,
+        "How often a second the grasp's quality is measured at most [Hz], in mode gripper; it takes"
+        " some 30 ms, and pulls wait meanwhile.",
+        (0.05, 100.0),
+    )
     parameters.live(MARKERS, True, "Publish markers for RViz and the like.")
     parameters.live(
         MARKER_RATE,
@@ -146,6 +155,7 @@ def declare(node: Node) -> SolverParameters:
         object_name=object_name,
         gravity=checks.vector("gravity", list(gravity), 3, unit="m/s^2", largest=1e3),
         grasp_state_rate=grasp_state_rate,
+        quality_rate=quality_rate,
     )
 
 

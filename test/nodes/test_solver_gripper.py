@@ -104,7 +104,7 @@ def test_without_an_object_the_fingers_move_by_themselves(hand):
     (state,) = hand.states
     assert (state.object, state.held, state.stale, state.message) == ("", False, False, "")
     assert state.header.frame_id == BASE
-    assert math.isnan(state.quality.margin)
+    assert math.isnan(state.quality.margin) and math.isnan(state.quality.payload)
     free = hand.probe.pull_and_wait("finger_2", [SHUT])
     assert not free.contacts and not free.stale
     assert hand.probe.states("finger_1")[-1].pulls[0] == 0.0
@@ -207,6 +207,21 @@ def test_friction_is_told_per_contact(hand):
         assert vector(contact.wrench.force) == pytest.approx(push)
         turn = np.cross(vector(contact.position) - centre, push)
         assert vector(contact.wrench.torque) == pytest.approx(turn, abs=1e-12)
+
+
+def test_quality_is_measured(hand):
+    seen = len(hand.states)
+    held = hand.held(friction=0.2)
+    assert held.quality.margin == min(c.margin for c in held.contacts)
+
+    def measured():
+        found = hand.states[-1]
+        return found if found.quality.payload > 0.0 and found.held else None
+
+    quality = hand.probe.until(measured, "a quality").quality
+    assert quality.force_closure and 0.0 < quality.epsilon < 1.0 and quality.weakest
+    assert quality.payload > 0.02 * G
+    assert math.isnan(hand.states[seen - 1].quality.epsilon)  # there was no object
 
 
 def test_what_the_fingers_do_not_touch_stands_until_it_is_asked_for_again(hand):

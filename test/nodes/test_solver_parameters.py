@@ -21,10 +21,11 @@ OWN = (
     "object",
     "gravity",
     "grasp_state_rate",
+    "quality_rate",
     "markers",
     "marker_rate",
 )
-FIXED = OWN[:10]
+FIXED = OWN[:11]
 
 
 def test_every_parameter_is_described(start):
