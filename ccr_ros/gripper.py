@@ -17,10 +17,15 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from types import TracebackType
 from typing import Any
 
+from ccr_ros.gripper_reports import (
+    GraspReport,
+    GripperReport,
+    grasp_report,
+    gripper_report,
+)
 from ccr_ros.model.errors import CcrError
 from ccr_ros.runtime import enable_ros
 
@@ -53,29 +58,6 @@ class GripperFailed(GripperError):
         super().__init__(report.message)
 
 
-@dataclass(frozen=True)
-class GripperReport:
-    """What the gripper says of itself, or what became of a call.
-
-    Attributes:
-        state: One of ``GripperState``'s texts, e.g. ``holding``.
-        message: Why.
-        done: What was asked for is so.
-        forces: Contact force [N] by finger.
-        in_contact: Names of the fingers that touch.
-        object_held: Whether all required fingers press on the object.
-        release_in: Time until a release begins [s]; negative: none waits.
-    """
-
-    state: str
-    message: str
-    done: bool
-    forces: dict[str, float]
-    in_contact: tuple[str, ...]
-    object_held: bool = False
-    release_in: float = -1.0
-
-
 class Gripper:
     """One gripper, through the coordinator in its namespace.
 
@@ -92,7 +74,7 @@ class Gripper:
         enable_ros()
         import rclpy
         from ccr_msgs.action import Grasp, Release
-        from ccr_msgs.msg import GripperState
+        from ccr_msgs.msg import GraspState, GripperState
         from rclpy.action import ActionClient
         from rclpy.context import Context
         from rclpy.executors import SingleThreadedExecutor
@@ -104,6 +86,7 @@ class Gripper:
         self._timeout = timeout
         self._closed = False
         self._latest: Any = None
+        self._grasp: Any = None
         self._heard_at = 0.0
         self._trigger = Trigger.Request
         self._context = Context()
@@ -121,6 +104,7 @@ class Gripper:
         }
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self._node.create_subscription(GripperState, "gripper_state", self._hear, latched)
+        self._node.create_subscription(GraspState, "grasp_state", self._hear_grasp, latched)
         self._thread = threading.Thread(target=self._spin, name="gripper", daemon=True)
         self._thread.start()
         try:
@@ -221,7 +205,15 @@ class Gripper:
     @property
     def state(self) -> GripperReport:
         """What the gripper says of itself, the newest heard."""
-        return self._report(self._latest, True)
+        return gripper_report(self._latest, True)
+
+    @property
+    def in_hand(self) -> GraspReport | None:
+        """What the solver says of the object in hand, the newest heard; None: it says nothing.
+
+        The solver node says it in its mode gripper, while there is an object.
+        """
+        return None if self._grasp is None else grasp_report(self._grasp)
 
     def close(self) -> None:
         """Close the connection; what is held stays held. May be called again."""
@@ -248,6 +240,9 @@ class Gripper:
 
     def _hear(self, message: Any) -> None:
         self._latest, self._heard_at = message, time.monotonic()
+
+    def _hear_grasp(self, message: Any) -> None:
+        self._grasp = message
 
     def _find(self) -> None:
         ends = [client.server_is_ready for client in self._actions.values()]
@@ -305,20 +300,7 @@ class Gripper:
         return self._latest.refusal or "the gripper refuses, and does not say why"
 
     def _judge(self, result: Any, done: bool) -> GripperReport:
-        report = self._report(result, done)
+        report = gripper_report(result, done)
         if not done:
             raise GripperFailed(report)
         return report
-
-    def _report(self, message: Any, done: bool) -> GripperReport:
-        fingers = message.fingers
-        touching = tuple(finger.finger for finger in fingers if finger.in_contact)
-        return GripperReport(
-            state=message.state,
-            message=message.message,
-            done=done,
-            forces={finger.finger: finger.force for finger in fingers},
-            in_contact=touching,
-            object_held=getattr(message, "object_held", message.state == "holding"),
-            release_in=getattr(message, "release_in", -1.0),
-        )

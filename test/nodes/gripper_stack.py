@@ -141,12 +141,21 @@ class GripperStack:
     """The nodes, and what a person does with them."""
 
     def __init__(
-        self, context: Context, probe: Probe, at: float = OPEN, bridge: Any = None, **values: Any
+        self,
+        context: Context,
+        probe: Probe,
+        at: float = OPEN,
+        bridge: Any = None,
+        mode: str = "fingers",
+        **values: Any,
     ) -> None:
         self.context = context
         self.probe = probe
         self._ended: list[Node] = []
-        self.solver = probe.add(SolverNode(context=context, namespace="gripper"))
+        overrides = [Parameter("mode", value=mode)]
+        self.solver = probe.add(
+            SolverNode(context=context, namespace="gripper", parameter_overrides=overrides)
+        )
         self.bridge = bridge or probe.add(FakeBridge(context, at))
         self.node = self.start_coordinator(**values)
         self.clients = {

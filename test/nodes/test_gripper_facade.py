@@ -2,6 +2,8 @@
 """The gripper in a person's words, through a coordinator that runs beside it."""
 
 import threading
+from contextlib import contextmanager
+from copy import deepcopy
 
 import pytest
 from gripper_stack import BALL
@@ -10,10 +12,10 @@ from ccr_ros.gripper import Gripper, GripperFailed, GripperRefused, NoGripper
 from ccr_ros.model import CcrError
 
 
-@pytest.fixture
-def running(stack):
-    """The nodes of a gripper that spin in a thread, and a facade to it."""
-    stack = stack().ready()
+@contextmanager
+def spinning(stack):
+    """Spin the nodes of a gripper in a thread; return them, and a facade to them."""
+    stack.ready()
     stack.show()  # so that the publisher is known: from another thread it only publishes
     over = threading.Event()
 
@@ -29,6 +31,12 @@ def running(stack):
     finally:
         over.set()
         thread.join()
+
+
+@pytest.fixture
+def running(stack):
+    with spinning(stack()) as both:
+        yield both
 
 
 @pytest.mark.long
@@ -56,8 +64,33 @@ def test_grasp_hold_release(running, monkeypatch):
     assert gripper.reset().state == "ready"  # no fault: nothing to do
 
 
+@pytest.mark.long
+def test_what_is_in_hand(stack):
+    with spinning(stack(mode="gripper")) as (nodes, gripper):
+        assert gripper.in_hand is None
+        ball = deepcopy(BALL)
+        ball.mass = 0.02
+        nodes.show(ball)
+        gripper._wait(lambda: gripper.in_hand, 60.0)
+        assert not gripper.in_hand.held and gripper.in_hand.forces == {}
+        gripper.grasp("ball", force=0.2)
+        ball.held = True
+        nodes.show(ball)
+        gripper._wait(lambda: gripper.in_hand.held, 60.0)
+        found = gripper.in_hand
+        assert (found.object, found.mass, found.stable, found.stale) == ("ball", 0.02, True, False)
+        assert found.position[2] < 0.11
+        assert found.orientation == pytest.approx((0, 0, 0, 1), abs=1e-4)
+        assert set(found.forces) == {"finger_1", "finger_2", "finger_3"}
+        assert all(force > 0.05 for force in found.forces.values())
+        assert gripper.state.object_held  # the coordinator goes on holding it
+        nodes.show()
+        gripper._wait(lambda: gripper.in_hand is None, 60.0)
+
+
 def test_errors_say_what_is_wrong(running):
     _, gripper = running
+    assert gripper.in_hand is None  # the solver is in mode fingers
     with pytest.raises(GripperRefused, match=r"force: 99\.0 is not allowed"):
         gripper.grasp(force=99.0)
     with pytest.raises(GripperRefused, match="unknown finger 'thumb'"):
