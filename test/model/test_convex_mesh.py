@@ -173,6 +173,11 @@ def test_dents_are_told_apart_from_rounding():
         ConvexMesh(dented(1e-3), DENTED)
 
 
+def test_a_sheet_with_coarsely_rounded_numbers_is_convex():
+    turned = Pose([0, 0, 0], TURN).points(CORNERS / SIZE * [0.1, 0.0005, 0.1])
+    ConvexMesh(np.round(turned, 5), SIDES)
+
+
 # A dent along an edge: two triangles of a side that is not flat, joined the wrong way round.
 SADDLE = CORNERS + np.array([[0.01, 0, 0] if k == 7 else [0, 0, 0] for k in range(8)])
 FOLDED = [*(s for s in SIDES if s not in ([4, 6, 7], [4, 7, 5])), [4, 6, 5], [6, 7, 5]]

@@ -147,11 +147,13 @@ class Hull:
         planes: Its faces, flat ones as one; all points are inside.
         triangles: (T, 3) numbers of the points at the corners of its surface's triangles.
         volume: [m^3].
+        area: Of its surface [m^2].
     """
 
     planes: HalfSpaces
     triangles: np.ndarray
     volume: float
+    area: float
 
 
 def convex_hull(place: str, points: np.ndarray) -> Hull:
@@ -183,7 +185,7 @@ def convex_hull(place: str, points: np.ndarray) -> Hull:
             allowed = f"points whose hull has at most {MAX_FACES} flat faces: simplify the mesh"
             raise InvalidValue(place, f"{len(points)} points", allowed)
     planes = HalfSpaces(normals[kept], (points @ normals[kept].T).max(axis=0))
-    return Hull(planes, hull.simplices.astype(int), float(hull.volume))
+    return Hull(planes, hull.simplices.astype(int), float(hull.volume), float(hull.area))
 
 
 def polytope(planes: HalfSpaces, inside: np.ndarray) -> Polytope:

@@ -8,8 +8,7 @@ import numpy as np
 from ..errors import InvalidValue
 from .polytope import Hull
 
-# What the rounded numbers of an STL file may be off, relative to size and to the hull's volume.
-_DENT, _LOST = 1e-4, 1e-3
+_DENT = 1e-4  # of the size: how far the rounded numbers of an STL file may be off
 
 
 def check_watertight(faces: np.ndarray) -> None:
@@ -50,13 +49,13 @@ def check_convex(vertices: np.ndarray, faces: np.ndarray, hull: Hull, volume: fl
     depth = hull.planes.depth(vertices[used])
     worst = int(np.argmax(depth))
     allowed = "convex (a mesh's convex hull is taken only if asked for)"
-    if depth[worst] > _DENT * size:
+    dent = _DENT * size
+    if depth[worst] > dent:
         k = int(used[worst])
         given = f"a mesh whose vertex {k} is {depth[worst] * 1e3:.3g} mm inside of its hull"
         raise InvalidValue(f"vertices[{k}]", given, allowed)
-    share = volume / hull.volume
-    if abs(share - 1) > _LOST:
-        given = f"a mesh that fills {share:.1%} of its hull"
+    if abs(volume - hull.volume) > dent * hull.area:
+        given = f"a mesh that fills {volume / hull.volume:.1%} of its hull"
         raise InvalidValue("faces", given, allowed)
 
 
