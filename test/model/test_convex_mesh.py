@@ -174,8 +174,17 @@ def test_dents_are_told_apart_from_rounding():
 
 
 def test_a_sheet_with_coarsely_rounded_numbers_is_convex():
-    turned = Pose([0, 0, 0], TURN).points(CORNERS / SIZE * [0.1, 0.0005, 0.1])
-    ConvexMesh(np.round(turned, 5), SIDES)
+    # So turned, the two triangles of a side are joined along the wrong diagonal by rounding.
+    turn = np.array([0.3, 0.4, 0.5, 0.7]) / np.linalg.norm([0.3, 0.4, 0.5, 0.7])
+    corners = Pose([0, 0, 0], turn).points(CORNERS / SIZE * [0.1, 0.0005, 0.1]).round(5)
+    lost = (
+        1
+        - abs(np.linalg.det(corners[SIDES] - corners[0])).sum()
+        / 6
+        / convex_hull("v", corners).volume
+    )
+    assert 0.002 < lost < 0.003
+    ConvexMesh(corners, SIDES)
 
 
 # A dent along an edge: two triangles of a side that is not flat, joined the wrong way round.
