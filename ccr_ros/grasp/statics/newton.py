@@ -17,7 +17,7 @@ direction turns as the force does (the linearised projection of `friction`).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,7 +28,9 @@ from ccr_ros.model.sqp import Bounds, definite
 from .assembly import FingerBlock, GraspPoint, Hand
 from .friction import RHO
 
-_AUGMENT = 10.0  # as in ccr_ros.model.sqp
+# Weights of the augmentation (as in ccr_ros.model.sqp), in turn until the matrix is definite; in
+# a grasp it is the others' contacts that make a finger stable, which may take more than 10.
+_AUGMENT = (10.0, 1e3, 1e5)
 _PROX = 1e-9  # of the object's own block: a ball may turn freely, and shall not
 _YIELD = 1e-8  # relative compliance of points that stick, from force to force: twins share a load
 
@@ -121,9 +123,71 @@ def newton_step(
         bounds: Per finger.
         free: Whether the object moves; else its support holds it where it is.
     """
-    corner, right = np.eye(6) * _PROX, -at.load
-    fingers, values, active, yields, kept = [], [], [], [], []
     surfaces = [_surface(part) for part in at.blocks]
+    for weight in _AUGMENT:
+        last = weight == _AUGMENT[-1]
+        system = _eliminated(
+            hand, at, bounds, surfaces, free, weight, definite if last else _upright
+        )
+        if system is not None:
+            return _solved(hand, at, surfaces, system, free)
+    return None
+
+
+def _upright(matrix: np.ndarray) -> np.ndarray | None:
+    """The matrix if it is positive definite."""
+    try:
+        np.linalg.cholesky(matrix)
+    except np.linalg.LinAlgError:
+        return None
+    return matrix
+
+
+@dataclass(frozen=True, eq=False)
+class _Eliminated:
+    """A finger after elimination: D^-1 on slope, border and forces, and its rows.
+
+    Attributes:
+        by_slope: (N,); by_q: (N, 6); by_force: (N, r).
+        border: (N, 6).
+        rows: (r, N), columns: (r, 6): R and C; acting_q: (r, 6): G.
+        values: (r,) room of lengths and normals, or negative ways; active: (r,).
+        yields, kept: (r,) compliances, and forces that they count from.
+    """
+
+    by_slope: np.ndarray
+    by_q: np.ndarray
+    by_force: np.ndarray
+    border: np.ndarray
+    rows: np.ndarray
+    columns: np.ndarray
+    acting_q: np.ndarray
+    values: np.ndarray
+    active: np.ndarray
+    yields: np.ndarray
+    kept: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class _System:
+    """All fingers after elimination, and the inverse of the object's own matrix S."""
+
+    fingers: list[_Eliminated]
+    right: np.ndarray
+    inverse: np.ndarray
+
+
+def _eliminated(
+    hand: Hand,
+    at: GraspPoint,
+    bounds: Sequence[Bounds],
+    surfaces: list[_Surface],
+    free: bool,
+    augment: float,
+    checked: Callable[[np.ndarray], np.ndarray | None],
+) -> _System | None:
+    corner, right = np.eye(6) * _PROX, -at.load
+    fingers = []
     for weight, part, bound, surface in zip(hand.weights, at.blocks, bounds, surfaces, strict=True):
         point = part.point
         slacks, pressed = point.slacks(bound), point.active
@@ -137,13 +201,13 @@ def newton_step(
             size = np.einsum("ij,ij->i", rows, rows)
             if free:
                 size = size + np.einsum("ij,ij->i", columns, columns)
-            raised = weight * _AUGMENT / np.maximum(size, 1e-12)
+            raised = weight * augment / np.maximum(size, 1e-12)
             matrix = matrix + (rows.T * raised) @ rows
             border = border + (rows.T * raised) @ columns
             corner = corner + (columns.T * raised) @ columns
             slope = slope - rows.T @ (raised * target)
             right = right - columns.T @ (raised * target)
-        solid = definite(matrix)
+        solid = checked(matrix)
         if solid is None:
             return None
         changed = np.concatenate([point.rows, surface.rows])
@@ -156,98 +220,93 @@ def newton_step(
             acting_q[index] += np.einsum("gi,gij->gj", drag, part.friction.columns)
         known = np.concatenate([slope[None], border.T, acting]).T
         solved = np.linalg.solve(solid, known)
-        fingers.append((solved[:, 0], solved[:, 1:7], solved[:, 7:], border, changed, changed_q,
-                        acting_q))  # fmt: skip
-        values.append(np.concatenate([slacks, -surface.ways]))
-        active.append(np.concatenate([pressed, np.ones(len(surface.ways), dtype=bool)]))
-        yields.append(surface.yields / weight)
-        kept.append(surface.forces * weight)
-
-    forces = _constraint_forces(
-        fingers, values, active, yields, kept, surfaces, corner, right, free
-    )
-    if forces is None:
-        return None
-    found, body_step = forces
-    steps, multipliers, friction, first = [], [], [], 0
-    for weight, part, surface, (by_g, by_q, by_rows, *_) in zip(
-        hand.weights, at.blocks, surfaces, fingers, strict=True
-    ):
-        own = found[first : first + by_rows.shape[1]]
-        first += len(own)
-        steps.append(-(by_g + by_rows @ own + by_q @ body_step))
-        own = own / weight
-        normal, along = own[: len(part.point.rows)], own[len(part.point.rows) :]
-        multipliers.append(normal)
-        index = part.friction.index
-        friction.append(
-            np.einsum("s,sgi->gi", along, surface.axes) + normal[index, None] * surface.drag
+        fingers.append(
+            _Eliminated(
+                by_slope=solved[:, 0],
+                by_q=solved[:, 1:7],
+                by_force=solved[:, 7:],
+                border=border,
+                rows=changed,
+                columns=changed_q,
+                acting_q=acting_q,
+                values=np.concatenate([slacks, -surface.ways]),
+                active=np.concatenate([pressed, np.ones(len(surface.ways), dtype=bool)]),
+                yields=surface.yields / weight,
+                kept=surface.forces * weight,
+            )
         )
-    if not all(np.isfinite(step).all() for step in [*steps, body_step]):
+    if not free:
+        return _System(fingers, np.zeros(6), np.zeros((6, 6)))
+    body = checked(corner - sum(f.border.T @ f.by_q for f in fingers))
+    if body is None:
         return None
-    return Step(steps, body_step, multipliers, friction)
+    inverse = np.linalg.inv(body)
+    right = right - sum(f.border.T @ f.by_slope for f in fingers)
+    return _System(fingers, right, 0.5 * (inverse + inverse.T))
 
 
-def _constraint_forces(
-    fingers: list,
-    values: list[np.ndarray],
-    active: list[np.ndarray],
-    yields: list[np.ndarray],
-    kept: list[np.ndarray],
-    surfaces: list[_Surface],
-    corner: np.ndarray,
-    right: np.ndarray,
-    free: bool,
-) -> tuple[np.ndarray, np.ndarray] | None:
-    """The forces of all rows, and the object's step."""
-    counts = [len(v) for v in values]
+def _solved(
+    hand: Hand, at: GraspPoint, surfaces: list[_Surface], system: _System, free: bool
+) -> Step | None:
+    """The step and the constraints' forces."""
+    counts = [len(f.values) for f in system.fingers]
     total = sum(counts)
-    gram, residual = np.zeros((total, total)), np.concatenate(values)
+    gram = np.zeros((total, total))
+    residual = np.concatenate([f.values for f in system.fingers])
     first = 0
-    for by_g, _, by_rows, _, changed, _, _ in fingers:
-        last = first + len(changed)
-        gram[first:last, first:last] = changed @ by_rows
-        residual[first:last] += changed @ by_g
-        first = last
-    by_slope, inverse, out = np.zeros(6), np.zeros((6, 6)), np.zeros((total, 6))
+    for f, count in zip(system.fingers, counts, strict=True):
+        own = slice(first, first + count)
+        gram[own, own] = f.rows @ f.by_force
+        residual[own] += f.rows @ f.by_slope
+        first += count
+    out, by_slope = np.zeros((total, 6)), system.inverse @ system.right
     if free:
-        body = definite(corner - sum(b.T @ by_q for _, by_q, _, b, *_ in fingers))
-        if body is None:
-            return None
-        right = right - sum(b.T @ by_g for by_g, _, _, b, *_ in fingers)
-        inverse = np.linalg.inv(body)
-        inverse = 0.5 * (inverse + inverse.T)
-        reach = np.concatenate([c_q - c @ by_q for _, by_q, _, _, c, c_q, _ in fingers])
-        out = np.concatenate([a_q - by_r.T @ b for _, _, by_r, b, _, _, a_q in fingers])
-        by_slope = inverse @ right
-        gram += reach @ inverse @ out.T
+        reach = np.concatenate([f.columns - f.rows @ f.by_q for f in system.fingers])
+        out = np.concatenate([f.acting_q - f.by_force.T @ f.border for f in system.fingers])
+        gram += reach @ system.inverse @ out.T
         residual += reach @ by_slope
     # Which rows are inequalities (lengths, normals), which are ways along the surface.
     along = np.concatenate(
         [np.arange(n) >= n - len(s.ways) for n, s in zip(counts, surfaces, strict=True)]
     )
-    found = _solve(gram, residual, np.concatenate(active), along,
-                   np.concatenate(yields), np.concatenate(kept), surfaces)  # fmt: skip
+    found = _forces(system, surfaces, gram, residual, along)
     if found is None or not np.isfinite(found).all():
         return None
-    return found, -(by_slope + inverse @ (out.T @ found)) if free else np.zeros(6)
+    body_step = -(by_slope + system.inverse @ (out.T @ found))
+    steps, multipliers, friction, first = [], [], [], 0
+    for weight, part, surface, f, count in zip(
+        hand.weights, at.blocks, surfaces, system.fingers, counts, strict=True
+    ):
+        pushed = found[first : first + count]
+        first += count
+        steps.append(-(f.by_slope + f.by_force @ pushed + f.by_q @ body_step))
+        pushed = pushed / weight
+        normal, tangential = pushed[: len(part.point.rows)], pushed[len(part.point.rows) :]
+        multipliers.append(normal)
+        index = part.friction.index
+        across = np.einsum("s,sgi->gi", tangential, surface.axes)
+        friction.append(across + normal[index, None] * surface.drag)
+    if not all(np.isfinite(step).all() for step in [*steps, body_step]):
+        return None
+    return Step(steps, body_step, multipliers, friction)
 
 
-def _solve(
+def _forces(
+    system: _System,
+    surfaces: list[_Surface],
     gram: np.ndarray,
     residual: np.ndarray,
-    active: np.ndarray,
     along: np.ndarray,
-    yields: np.ndarray,
-    kept: np.ndarray,
-    surfaces: list[_Surface],
 ) -> np.ndarray | None:
     """Forces of rows: those along the surface by elimination, the others by complementarity."""
+    active = np.concatenate([f.active for f in system.fingers])
     if not along.any():
         return solve_multipliers(0.5 * (gram + gram.T), residual, active)
     bound, way = np.flatnonzero(~along), np.flatnonzero(along)
     inner = gram[way[:, None], way]
     sticks = np.concatenate([s.sticks for s in surfaces])
+    yields = np.concatenate([f.yields for f in system.fingers])
+    kept = np.concatenate([f.kept for f in system.fingers])
     soft = np.where(sticks, _YIELD * np.maximum(np.diag(inner), 1e-12), yields)
     inner = inner + np.diag(soft)
     # residual + W m + soft (m - kept) = 0 for rows that stick; kept does not count in slip
@@ -259,14 +318,11 @@ def _solve(
     across = gram[bound[:, None], way]
     left = gram[bound[:, None], bound] - across @ solved[:, 1:]
     value = residual[bound] - across @ solved[:, 0]
-    pushing = solve_multipliers(left, value, active[bound], symmetric=not _slipping(surfaces))
+    symmetric = all(s.sticks.all() for s in surfaces)
+    pushing = solve_multipliers(left, value, active[bound], symmetric)
     if pushing is None:
         return None
     found = np.zeros(len(residual))
     found[bound] = pushing
     found[way] = -(solved[:, 0] + solved[:, 1:] @ pushing)
     return found
-
-
-def _slipping(surfaces: list[_Surface]) -> bool:
-    return any(not s.sticks.all() for s in surfaces)

@@ -1,0 +1,326 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Pulls over time that shift and turn a held object, every contact kept.
+
+The plan is made on the whole-gripper model itself: a step from sensitivities, then the equilibrium
+there with all its friction, again and again (a continuation in the object's pose). What the model
+does not follow within the limits is not planned; what stopped it is named.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ccr_ros.grasp.statics import GraspSolution, GraspSolver
+from ccr_ros.grasp.statics.sensitivity import grasp_sensitivity
+from ccr_ros.model import checks
+from ccr_ros.model.errors import InvalidValue, NotConverged, UnknownName
+from ccr_ros.model.rotation import Pose
+
+from .step import StepLimits, best_step, constraint_rows
+
+_ARM = 0.02  # m; as far from its centre a turn counts as much as a shift
+_ASIDE = 0.1  # weight of motions that were not asked for
+_LEAST = 0.02  # share of a step's wanted motion below which nothing gets on any more
+_SHRINKS = 5  # times that a step is halved before it is given up
+
+
+@dataclass(frozen=True)
+class MoveTarget:
+    """Where a held object is to go, from where it is.
+
+    Attributes:
+        shift: (3,) [m] of its centre, in the gripper's frame.
+        turn: (3,) [rad] rotation vector about its centre, in the gripper's frame.
+        shift_tolerance: [m]; turn_tolerance: [rad].
+
+    Raises:
+        InvalidValue: Nothing is asked for, or a value is out of range.
+    """
+
+    shift: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    turn: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    shift_tolerance: float = 1e-4
+    turn_tolerance: float = np.deg2rad(0.2)
+
+    def __post_init__(self) -> None:
+        shift = checks.vector("shift", self.shift, 3, unit="m", largest=1.0)
+        turn = checks.vector("turn", self.turn, 3, unit="rad", largest=np.pi)
+        if float(np.linalg.norm(turn)) > np.pi:
+            raise InvalidValue("turn", turn.tolist(), "a rotation vector of at most pi [rad]")
+        object.__setattr__(self, "shift", shift)
+        object.__setattr__(self, "turn", turn)
+        checks.real("shift_tolerance", self.shift_tolerance, above=0, high=0.1, unit="m")
+        checks.real("turn_tolerance", self.turn_tolerance, above=0, high=1.0, unit="rad")
+        if not (np.any(shift) or np.any(turn)):
+            raise InvalidValue("target", [0.0] * 6, "a shift or a turn that is not zero")
+
+
+@dataclass(frozen=True, eq=False)
+class MoveLimits:
+    """What a plan keeps.
+
+    Attributes:
+        margin: Least friction margin of each contact, in [0, 1).
+        least_force: Of each contact [N]; largest_force: [N].
+        least_tension: Of each cable [N].
+        pulls: Lowest and highest pull (m, 2) [m] by finger, one row per cable; absent: from zero
+            to a fifth of the finger's length.
+        step: Largest change of a pull from one waypoint to the next [m].
+        stiffness: Least eigenvalue of the grasp (`GraspSolution.smallest_eigenvalue`).
+        waypoints: Largest number.
+    """
+
+    margin: float = 0.1
+    least_force: float = 0.005
+    largest_force: float = 5.0
+    least_tension: float = 0.0
+    pulls: dict[str, np.ndarray] = field(default_factory=dict)
+    step: float = 1e-4
+    stiffness: float = 1e-3
+    waypoints: int = 400
+
+    def __post_init__(self) -> None:
+        checks.real("margin", self.margin, low=0, below=1)
+        checks.real("least_force", self.least_force, low=0, unit="N")
+        checks.real("largest_force", self.largest_force, above=self.least_force, unit="N")
+        checks.real("least_tension", self.least_tension, low=0, unit="N")
+        checks.real("step", self.step, above=0, high=0.01, unit="m")
+        checks.real("stiffness", self.stiffness, low=0, high=1)
+        checks.integer("waypoints", self.waypoints, low=1, high=100000)
+
+    def for_solver(self, solver: GraspSolver) -> StepLimits:
+        """Return these limits in the order of a solver's cables.
+
+        Raises:
+            UnknownName, InvalidValue: Pull limits of no finger, or not of its cables.
+        """
+        for name in self.pulls:
+            if name not in solver.names:
+                raise UnknownName("finger", name, solver.names)
+        low, high = [], []
+        for mounted in solver.hand.mounted:
+            finger, count = mounted.finger, len(mounted.finger.cables)
+            default = np.tile([0.0, 0.2 * finger.length], (count, 1))
+            given = np.asarray(self.pulls.get(finger.name, default), dtype=float)
+            place = f"limits.pulls.{finger.name}"
+            if given.shape != (count, 2) or not np.isfinite(given).all():
+                raise InvalidValue(place, given.tolist(), f"{count} pairs of finite pulls [m]")
+            if (given[:, 0] > given[:, 1]).any():
+                raise InvalidValue(place, given.tolist(), "pairs, the lower pull first")
+            low.append(given[:, 0])
+            high.append(given[:, 1])
+        return StepLimits(
+            self.margin, self.least_force, self.largest_force, self.least_tension,
+            np.concatenate(low), np.concatenate(high), self.step,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Waypoint:
+    """One pose on the way.
+
+    Attributes:
+        pulls: By finger (m,) [m].
+        pose: Of the object in the gripper's frame.
+        margin: Smallest friction margin; force: smallest contact force [N].
+        moved: (6,) shift [m] and rotation vector [rad] since the beginning.
+    """
+
+    pulls: dict[str, np.ndarray]
+    pose: Pose
+    margin: float
+    force: float
+    moved: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class MovePlan:
+    """A way to a target, or as far towards it as limits allow.
+
+    Attributes:
+        target: What was asked for.
+        waypoints: From where the object is (included) on.
+        reached: The last waypoint is the target, to its tolerances.
+        share: Of the way that the last waypoint has, 1 for all of it.
+        limiting: What stopped it, in words; empty if nothing did.
+    """
+
+    target: MoveTarget
+    waypoints: tuple[Waypoint, ...]
+    reached: bool
+    share: float
+    limiting: str
+
+    @property
+    def margin(self) -> float:
+        """Smallest friction margin on the way."""
+        return min(w.margin for w in self.waypoints)
+
+    @property
+    def moved(self) -> np.ndarray:
+        """(6,) shift [m] and rotation vector [rad] at the end."""
+        return self.waypoints[-1].moved
+
+
+def plan_move(
+    solver: GraspSolver,
+    target: MoveTarget,
+    limits: MoveLimits | None = None,
+    watch: Callable[[Waypoint], bool] | None = None,
+) -> MovePlan:
+    """Plan pulls that move a held object; the solver is left where it stands.
+
+    Args:
+        solver: Of a grasp that holds its object.
+        target: Where to.
+        limits: What to keep.
+        watch: Called with each new waypoint; the plan ends there when it returns False.
+
+    Raises:
+        InvalidValue: Nothing is held, the object is supported, or limits are not of this gripper.
+        NotConverged: The present grasp is no equilibrium any more.
+    """
+    limits = MoveLimits() if limits is None else limits
+    bounds = limits.for_solver(solver)
+    if solver.supported or solver.point is None:
+        raise InvalidValue("grasp", "supported", "an object that the fingers alone hold (let_go)")
+    before = solver.standing
+    try:
+        return _Planner(solver, target, limits, bounds, watch).run()
+    finally:
+        solver.resume(before)
+
+
+class _Planner:
+    def __init__(
+        self,
+        solver: GraspSolver,
+        target: MoveTarget,
+        limits: MoveLimits,
+        bounds: StepLimits,
+        watch: Callable[[Waypoint], bool] | None,
+    ) -> None:
+        self.solver = solver
+        self.target = target
+        self.limits = limits
+        self.bounds = bounds
+        self.watch = watch
+        self.start = solver.body.pose
+        self.way = np.concatenate([target.shift, target.turn])
+        scaled = self.way * np.array([1.0] * 3 + [_ARM] * 3)
+        self.along = scaled / np.linalg.norm(scaled)
+
+    def run(self) -> MovePlan:
+        solution = self.solver.solve({}).require_converged()
+        first = self._waypoint(solution)
+        # A grasp that is weaker than the limits may be moved, and not get weaker.
+        self.bounds = StepLimits(
+            **{
+                **vars(self.bounds),
+                "margin": min(self.bounds.margin, max(0.0, solution.margin)),
+                "least_force": min(self.bounds.least_force, first.force),
+            }
+        )
+        waypoints, limiting, size = [first], "", self.limits.step
+        while len(waypoints) <= self.limits.waypoints:
+            left = self.way - waypoints[-1].moved
+            if self._there(left):
+                return self._plan(waypoints, True, "")
+            found = self._step(solution, left, size)
+            if isinstance(found, str):
+                limiting = found
+                break
+            solution, size = found
+            waypoints.append(self._waypoint(solution))
+            size = min(self.limits.step, 2 * size)
+            if self.watch is not None and not self.watch(waypoints[-1]):
+                limiting = "stopped by the caller"
+                break
+        else:
+            limiting = f"the number of waypoints: {self.limits.waypoints} at most"
+        return self._plan(waypoints, False, limiting)
+
+    def _there(self, left: np.ndarray) -> bool:
+        asked_shift, asked_turn = np.any(self.target.shift), np.any(self.target.turn)
+        far = float(np.linalg.norm(left[:3])) if asked_shift else 0.0
+        # Of a turn, what counts is how far it has come about the axis asked for.
+        turn = abs(float(left[3:] @ _unit(self.target.turn))) if asked_turn else 0.0
+        return far <= self.target.shift_tolerance and turn <= self.target.turn_tolerance
+
+    def _step(
+        self, solution: GraspSolution, left: np.ndarray, size: float
+    ) -> tuple[GraspSolution, float] | str:
+        """The next solution and the step's size, or why there is none."""
+        before = self.solver.standing
+        pulls = np.concatenate(list(self.solver.pulls.values()))
+        try:
+            slopes = grasp_sensitivity(self.solver)
+        except NotConverged as error:
+            return str(error)
+        scale = np.diag([1.0] * 3 + [_ARM] * 3)
+        onward = np.outer(self.along, self.along) @ scale
+        weights = np.concatenate([onward, _ASIDE * (scale - onward)]) / (_ARM * 0.02)
+        rows = constraint_rows(solution, slopes, pulls, self.bounds)
+        why = ""
+        for _ in range(_SHRINKS):
+            step = best_step(left, weights, 1.0, slopes, rows, size)
+            onwards = float(self.along @ (scale @ step.motion))
+            able = float(np.abs(self.along @ scale @ slopes.motion).sum()) * size
+            asked = min(float(self.along @ (scale @ left)), able)
+            if onwards < _LEAST * asked or asked <= 0:
+                return why or "; ".join(step.limiting[:2]) or "no pull moves the object on"
+            names = {m.finger.name: m.finger.cables for m in self.solver.hand.mounted}
+            target, first = {}, 0
+            for name, cables in names.items():
+                target[name] = (pulls + step.change)[first : first + len(cables)]
+                first += len(cables)
+            found = self.solver.solve(target)
+            why = self._refusal(found)
+            if not why:
+                return found, size
+            self.solver.resume(before)
+            size *= 0.5
+        return why
+
+    def _refusal(self, found: GraspSolution) -> str:
+        """Why a solution may not be a waypoint, or nothing."""
+        if not found.converged:
+            return found.message
+        if found.smallest_eigenvalue < self.limits.stiffness:
+            return f"stability: {found.softest} at the slightest disturbance"
+        for contact in found.contacts:
+            if contact.status == "slip" or contact.margin < self.bounds.margin - 0.02:
+                return f"friction at disk {contact.disk} of {contact.finger}: it would slip"
+        return ""
+
+    def _waypoint(self, solution: GraspSolution) -> Waypoint:
+        pose = solution.body.pose
+        moved = np.concatenate(
+            [pose.position - self.start.position, _turn_between(self.start, pose)]
+        )
+        force = min((c.force for c in solution.contacts), default=0.0)
+        return Waypoint(self.solver.pulls, pose, solution.margin, force, moved)
+
+    def _plan(self, waypoints: list[Waypoint], reached: bool, limiting: str) -> MovePlan:
+        scale = np.array([1.0] * 3 + [_ARM] * 3)
+        whole = float(self.along @ (scale * self.way))
+        share = float(self.along @ (scale * waypoints[-1].moved)) / whole
+        return MovePlan(self.target, tuple(waypoints), reached, 1.0 if reached else share, limiting)
+
+
+def _unit(vector: np.ndarray) -> np.ndarray:
+    return vector / np.linalg.norm(vector)
+
+
+def _turn_between(start: Pose, end: Pose) -> np.ndarray:
+    """Rotation vector (3,) from one orientation to another, in the frame they are given in."""
+    turn = end.rotation @ start.rotation.T
+    axis = 0.5 * np.array(
+        [turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]]
+    )
+    sine, cosine = float(np.linalg.norm(axis)), 0.5 * (float(np.trace(turn)) - 1.0)
+    angle = float(np.arctan2(sine, cosine))
+    return axis * (angle / sine) if sine > 1e-12 else axis
