@@ -115,7 +115,7 @@ def finger_from_dict(data: Any, source: str | None = None, folder: Path | None =
         values["obstacles"] = obstacles_from_list(obstacles, "obstacles", folder)
         return Finger(**values)
     except InvalidValue as error:
-        raise error.located("", source) from None
+        raise error if error.source else error.located("", source) from None
 
 
 def _mounted(entry: Any, gripper_file: Path, place: str) -> MountedFinger:

@@ -196,6 +196,11 @@ def test_stl_files_are_found_beside_the_file_that_names_them(wedge, tmp_path, mo
     (tmp_path / "hand.yaml").write_text(GRIPPER + inline)
     for finger in load_gripper(tmp_path / "hand.yaml").fingers:
         np.testing.assert_allclose(finger.finger.obstacles[0].signed_distance(corner), 0, atol=1e-9)
+    path.write_text(FINGER.replace("scale: 0.001, ", ""))
+    with pytest.raises(
+        InvalidValue, match=r"meshes/wedge\.stl: scale: .*millimetres: scale 0\.001"
+    ):
+        load_finger(path)
     wedge.unlink()
     with pytest.raises(InvalidFile, match=r"wedge\.stl: cannot be read.*obstacles\[0\]\.file"):
         load_finger(path)
