@@ -28,6 +28,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     ),
     "test": ("ccr_ros.cli.test", "run the linters, the type checker and the tests"),
     "solve": ("ccr_ros.cli.solve", "solve one finger for given cable pulls"),
+    "grasp": ("ccr_ros.cli.grasp", "close a gripper on an object and see how it is held"),
     "design": (
         "ccr_ros.cli.design",
         "rest shapes, routings, pulls and grippers for a wanted shape",
