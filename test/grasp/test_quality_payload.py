@@ -39,6 +39,7 @@ def within_rigid_bound(loads):
     return loads.held <= bound.upper * (1 + 1e-6)
 
 
+@pytest.mark.long
 def test_a_pinch_is_lost_at_twice_friction_times_grip(pinched):
     before = pinched.standing
     loads = payload_until_slip(pinched)
