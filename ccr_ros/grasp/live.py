@@ -14,6 +14,8 @@ from ccr_ros.model.files import MountedFinger
 from ccr_ros.model.rotation import Pose
 from ccr_ros.model.settings import SolverSettings
 
+_SAME = 1e-6  # m; pulls as near as that to some that failed are not tried
+
 
 class LiveGrasp:
     """Keeps fingers and object in equilibrium, as somebody says from time to time what is wanted.
@@ -47,6 +49,7 @@ class LiveGrasp:
         self._mass = body.mass
         self._wanted = False  # whether it shall be held
         self._to_let_go = False
+        self._failed: tuple[dict[str, np.ndarray], GraspSolution] | None = None
         self.solution: GraspSolution | None = None  # the last good one
         self.failure = ""
         """Why the newest wishes or pulls have no solution; a held object is dropped then."""
@@ -99,25 +102,36 @@ class LiveGrasp:
         self._to_let_go = held and self._solver.supported
         if not held:
             self.refusal = ""
+        if due:
+            self._failed = None
         return due
 
     def solve(self, pulls: Pulls) -> GraspSolution:
         """Return the equilibrium for pulls [m] by finger, or how far it came where there is none.
 
+        To find that there is none takes long: pulls that failed are not tried again while nothing
+        else is wanted.
+
         Raises:
             InvalidValue, UnknownName: Bad pulls; nothing has moved.
         """
+        if self._failed is not None and _near(pulls, self._failed[0]):
+            return self._failed[1]
         found = self._solver.solve(pulls, mass=self._mass)
-        self.failure = ""
+        self.failure, self._failed = "", None
         if not found.converged:
-            self.failure = found.message if found.supported else f"dropped: {found.message}"
-            return found
+            reason = found.message if found.supported else f"dropped: {found.message}"
+            return self._fail(reason, pulls, found)
         if not found.supported and not found.contacts:
-            self.failure = "dropped: no finger touches it any more"
-            return found
+            return self._fail("dropped: no finger touches it any more", pulls, found)
         if self._to_let_go:
             found = self._let_go(found)
         self.solution = found
+        return found
+
+    def _fail(self, reason: str, pulls: Pulls, found: GraspSolution) -> GraspSolution:
+        self.failure = reason
+        self._failed = {name: np.array(pull) for name, pull in pulls.items()}, found
         return found
 
     def _let_go(self, standing: GraspSolution) -> GraspSolution:
@@ -137,4 +151,10 @@ def _same(one: Pose, two: Pose) -> bool:
     return bool(
         np.array_equal(one.position, two.position)
         and np.array_equal(one.orientation, two.orientation)
+    )
+
+
+def _near(one: Pulls, two: Pulls) -> bool:
+    return one.keys() == two.keys() and all(
+        bool(np.all(np.abs(np.asarray(one[name]) - two[name]) <= _SAME)) for name in one
     )

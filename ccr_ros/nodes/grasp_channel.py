@@ -125,10 +125,13 @@ class GraspChannel:
             names = ", ".join(item.name for item in chosen)
             allowed = "one that has a mass or is held; the parameter 'object' says which is meant"
             raise InvalidValue("objects", names, allowed)
-        if chosen and self._frame(chosen[0]) in self._taken_frames():
-            allowed = f"no name of which {self._frame(chosen[0])} is a frame already"
+        if not chosen:
+            return None
+        frame = self._frame(chosen[0])
+        if frame in self._taken_frames() or frame.startswith("/"):
+            allowed = f"a name that gives a new frame, without '/' at its start (not {frame!r})"
             raise InvalidValue("objects.name", chosen[0].name, allowed)
-        return chosen[0] if chosen else None
+        return chosen[0]
 
     def take(self, item: SceneObject | None, anew: bool) -> bool:
         """Take the object of a new scene; return whether something is to be solved for it.

@@ -134,6 +134,8 @@ def test_what_gets_too_heavy_is_dropped_and_the_last_pose_stays(hanging):
     assert not pull(hanging, SHUT).converged
     assert not hanging.held and hanging.failure.startswith("dropped: ")
     assert hanging.solution is before
+    found = pull(hanging, SHUT)
+    assert pull(hanging, SHUT + 1e-7) is found  # which is not tried again
     # Pulls and wishes that can be met again are.
     assert hanging.want(PLACE, LIGHT, True)
     pull(hanging, SHUT)

@@ -313,7 +313,7 @@ def test_the_object_goes(hand):
 
 BAD = {
     "two": ([ball(), ball(name="other", held=True, height=0.4)], "the parameter 'object' says"),
-    "frame": ([ball(name="finger_1_tip")], "gripper/finger_1_tip is a frame already"),
+    "frame": ([ball(name="finger_1_tip")], "not 'gripper/finger_1_tip'"),
     "mass": ([ball(mass=-1.0)], "objects[0].mass"),
     "nan": ([ball(mass=math.nan)], "objects[0].mass"),
     "much": ([ball(mass=1e6)], "objects.ball.mass"),
