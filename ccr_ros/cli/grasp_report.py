@@ -79,7 +79,7 @@ def _measures(found: Findings, unit: str) -> list[str]:
         lines += [
             f"  friction margin {'none' if math.isnan(q.margin) else format(q.margin, '.3f')}",
             f"  {closed} {q.weakest_in_words}",
-            f"  the same grip could carry {q.payload:.4g} {unit}, its forces spread best",
+            f"  normal forces no larger than now could carry {q.payload:.4g} {unit}, spread best",
         ]
     if found.compliance is not None:
         c = found.compliance
