@@ -5,7 +5,7 @@ from test_friction import G, pinch
 
 from ccr_ros.grasp.quality import compliance_of
 from ccr_ros.grasp.statics import GraspSolver, sphere_body
-from ccr_ros.model import InvalidValue, Pose, load_gripper
+from ccr_ros.model import InvalidValue, NotConverged, Pose, load_gripper
 from ccr_ros.resources import find_config
 
 
@@ -58,3 +58,12 @@ def test_bad_values_are_named(pinched):
             compliance_of(pinched, length)
     with pytest.raises(InvalidValue, match="supported"):
         compliance_of(pinch(friction=0.5))
+
+
+def test_a_grasp_that_is_not_stable_is_refused():
+    slippery = pinch(friction=0.0)
+    assert not slippery.let_go().stable
+    before = slippery.standing
+    with pytest.raises(NotConverged, match="not stable"):
+        compliance_of(slippery)
+    assert slippery.point is before.point

@@ -9,7 +9,7 @@ from test_friction import G, pinch
 
 from ccr_ros.grasp.quality import contacts_of, largest_load, payload_until_slip
 from ccr_ros.grasp.statics import GraspSolver, sphere_body
-from ccr_ros.model import InvalidValue, Pose, load_gripper
+from ccr_ros.model import InvalidValue, NotConverged, Pose, load_gripper
 from ccr_ros.resources import find_config
 
 
@@ -85,3 +85,12 @@ def test_bad_values_are_named(pinched):
             payload_until_slip(pinched, **given)
     with pytest.raises(InvalidValue, match="supported"):
         payload_until_slip(pinch(friction=0.5))
+
+
+def test_a_grasp_that_is_not_stable_is_refused():
+    slippery = pinch(friction=0.0)
+    assert not slippery.let_go().stable
+    before = slippery.standing
+    with pytest.raises(NotConverged, match="not stable"):
+        payload_until_slip(slippery)
+    assert slippery.point is before.point

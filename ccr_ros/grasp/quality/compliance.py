@@ -13,7 +13,7 @@ import numpy as np
 
 from ccr_ros.grasp.statics.solver import GraspSolver
 from ccr_ros.model import checks
-from ccr_ros.model.errors import InvalidValue
+from ccr_ros.model.errors import InvalidValue, NotConverged
 from ccr_ros.model.rotation import Pose
 
 from .wrenches import wrench_in_words
@@ -52,13 +52,15 @@ def compliance_of(solver: GraspSolver, length: float | None = None) -> Complianc
 
     Raises:
         InvalidValue: The length is out of range, or the object is supported or not touched.
-        NotConverged: The solver does not stand in an equilibrium it can solve again.
+        NotConverged: The solver does not stand in a stable equilibrium.
     """
     if solver.supported:
         raise InvalidValue("solver", "with a supported object", "one whose object was let go")
     begin = solver.standing
     try:
         start = solver.solve({}).require_converged()
+        if not start.stable:
+            raise NotConverged("grasp", start.message)
         if not start.contacts:
             raise InvalidValue("solver", "without contacts", "one that holds an object")
         pose = start.body.pose
