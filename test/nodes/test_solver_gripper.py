@@ -17,6 +17,7 @@ from ccr_ros.model import CcrError
 FINGERS = ("finger_1", "finger_2", "finger_3")
 LENGTH = 0.182  # m
 SHUT, TIGHT = 0.032 * LENGTH, 0.034 * LENGTH  # pulls
+NEAR = 0.1073  # m; a little above where the closed fingers carry the ball
 G = 9.80665
 BASE = "gripper/gripper_base"
 
@@ -166,7 +167,7 @@ def test_standing_and_held(hand):
 
 def test_tf_and_markers_show_it_where_it_is(hand):
     tf, markers = hand.probe.transforms(), hand.probe.markers()
-    held = hand.held(friction=0.2)
+    held = hand.held(height=NEAR, friction=0.4)
 
     def transform():
         found = [t for m in tf for t in m.transforms if t.child_frame_id == "gripper/ball"]
@@ -194,14 +195,14 @@ def test_tf_and_markers_show_it_where_it_is(hand):
 
 
 def test_friction_is_told_per_contact(hand):
-    state = hand.held(friction=0.2)
-    assert state.friction == 0.2 and size(state.net) < 1e-6
+    state = hand.held(height=NEAR, friction=0.4)
+    assert state.friction == 0.4 and size(state.net) < 1e-6
     centre = vector(state.pose.position)
     for contact in state.contacts:
         normal, force = vector(contact.normal), vector(contact.friction_force)
         assert contact.status in (GraspContact.STICK, GraspContact.SLIP)
         assert force @ normal == pytest.approx(0.0, abs=1e-9)
-        share = np.linalg.norm(force) / (0.2 * contact.normal_force)
+        share = np.linalg.norm(force) / (0.4 * contact.normal_force)
         assert contact.margin == pytest.approx(1.0 - share, abs=1e-5)
         push = -(contact.normal_force * normal + force)
         assert vector(contact.wrench.force) == pytest.approx(push)
@@ -211,7 +212,7 @@ def test_friction_is_told_per_contact(hand):
 
 def test_quality_is_measured(hand):
     seen = len(hand.states)
-    held = hand.held(friction=0.2)
+    held = hand.held(height=NEAR, friction=0.4)
     assert held.quality.margin == min(c.margin for c in held.contacts)
 
     def measured():
