@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ccr_ros.grasp.statics import GraspSolution, GraspSolver
+from ccr_ros.grasp.statics.path import turn_between
 from ccr_ros.grasp.statics.sensitivity import grasp_sensitivity
 from ccr_ros.model import checks
 from ccr_ros.model.errors import InvalidValue, NotConverged, UnknownName
@@ -299,7 +300,7 @@ class _Planner:
     def _waypoint(self, solution: GraspSolution) -> Waypoint:
         pose = solution.body.pose
         moved = np.concatenate(
-            [pose.position - self.start.position, _turn_between(self.start, pose)]
+            [pose.position - self.start.position, turn_between(self.start, pose)]
         )
         force = min((c.force for c in solution.contacts), default=0.0)
         return Waypoint(self.solver.pulls, pose, solution.margin, force, moved)
@@ -313,14 +314,3 @@ class _Planner:
 
 def _unit(vector: np.ndarray) -> np.ndarray:
     return vector / np.linalg.norm(vector)
-
-
-def _turn_between(start: Pose, end: Pose) -> np.ndarray:
-    """Rotation vector (3,) from one orientation to another, in the frame they are given in."""
-    turn = end.rotation @ start.rotation.T
-    axis = 0.5 * np.array(
-        [turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]]
-    )
-    sine, cosine = float(np.linalg.norm(axis)), 0.5 * (float(np.trace(turn)) - 1.0)
-    angle = float(np.arctan2(sine, cosine))
-    return axis * (angle / sine) if sine > 1e-12 else axis

@@ -113,7 +113,11 @@ def _surface(part: FingerBlock) -> _Surface:
 
 
 def newton_step(
-    hand: Hand, at: GraspPoint, bounds: Sequence[Bounds], free: bool = True
+    hand: Hand,
+    at: GraspPoint,
+    bounds: Sequence[Bounds],
+    free: bool = True,
+    support: float = 0.0,
 ) -> Step | None:
     """Return the step from a point, or None where the quadratic problem has no solution.
 
@@ -122,13 +126,13 @@ def newton_step(
         at: Where.
         bounds: Per finger.
         free: Whether the object moves; else its support holds it where it is.
+        support: Stiffness of a support that gives way, in units; its force is in the load.
     """
     surfaces = [_surface(part) for part in at.blocks]
     for weight in _AUGMENT:
         last = weight == _AUGMENT[-1]
-        system = _eliminated(
-            hand, at, bounds, surfaces, free, weight, definite if last else _upright
-        )
+        checked = definite if last else _upright
+        system = _eliminated(hand, at, bounds, surfaces, free, support, weight, checked)
         if system is not None:
             return _solved(hand, at, surfaces, system, free)
     return None
@@ -183,10 +187,11 @@ def _eliminated(
     bounds: Sequence[Bounds],
     surfaces: list[_Surface],
     free: bool,
+    support: float,
     augment: float,
     checked: Callable[[np.ndarray], np.ndarray | None],
 ) -> _System | None:
-    corner, right = np.eye(6) * _PROX, -at.load
+    corner, right = np.eye(6) * (_PROX + support), -at.load
     fingers = []
     for weight, part, bound, surface in zip(hand.weights, at.blocks, bounds, surfaces, strict=True):
         point = part.point

@@ -22,6 +22,9 @@ from .newton import Step, newton_step
 _SMALLEST_STEP = 1.0 / 256
 _LARGEST_TURN = 0.5  # rad in one arc, or of the object, in one Newton step
 _LARGEST_SHIFT = 0.05  # of the length, of the object in one Newton step
+# Of a support that fades out, against shifts and turns, in units of EI / L^3 and EI / L: well above
+# what holds an object between fingers. A dead load in its place would tip over what it stands on.
+_SUPPORT = 100.0
 _LOAD_STEP = 0.1  # of the forces that press on the object, where there is friction
 
 
@@ -74,9 +77,21 @@ class Path:
         self.friction_step = friction_step
         self.free = free
         self._deadline = np.inf
+        self._stood: Pose | None = None
+        self._stiffness = 0.0
 
-    def walk(self, way: Way, target: list[np.ndarray], load: np.ndarray) -> None:
-        """Walk from where ``way`` stands to other pulls [m] and another load (6,), in units."""
+    def walk(
+        self,
+        way: Way,
+        target: list[np.ndarray],
+        load: np.ndarray,
+        stood: Pose | None = None,
+    ) -> None:
+        """Walk from where ``way`` stands to other pulls [m] and another load (6,), in units.
+
+        ``stood``: the pose of a support that goes soft on the way, and is gone at its end.
+        """
+        self._stood = stood
         rough = self.body.friction > 0
         start, begin_load = [p.copy() for p in way.pulls], way.point.load
         way.slid = way.slid or [np.zeros((len(p.points.labels), 3)) for p in self.hand.problems]
@@ -99,6 +114,7 @@ class Path:
             share = 1.0 if done + size > 1.0 - 1e-9 else done + size
             pulls = [a + share * (b - a) for a, b in zip(start, target, strict=True)]
             next_load = begin_load + share * (load - begin_load)
+            self._stiffness = 0.0 if stood is None else _SUPPORT * (1.0 - share)
             found = self._newton(way, way.point, pulls, next_load)
             if found is None and any(p.hold.slipping.any() for p in way.point.blocks):
                 # That what slips slips on was a guess, which may leave nothing to hold the object.
@@ -160,7 +176,7 @@ class Path:
     ) -> GraspPoint | None:
         """Solve for the equilibrium near a point; None if it is not found."""
         hand, tolerance = self.hand, self.settings.tolerance
-        at = gather(hand, start.pose, start.blocks, load, self.free)
+        at = gather(hand, start.pose, start.blocks, self._yielding(load, start.pose), self.free)
         bounds = [
             Bounds(p.length_bounds(u), np.zeros((len(p.obstacles), len(p.points.labels))))
             for p, u in zip(hand.problems, pulls, strict=True)
@@ -175,14 +191,22 @@ class Path:
                 return None if any(meeting_disks(p, part.point) for p, part in pairs) else at
             if time.thread_time() > self._deadline:
                 return None
-            step = newton_step(hand, at, bounds, self.free)
+            step = newton_step(hand, at, bounds, self.free, self._stiffness)
             if step is None:
                 return None
             way.iterations += 1
-            at = self._moved(at, step)
+            at = self._moved(at, step, load)
         return None
 
-    def _moved(self, at: GraspPoint, step: Step) -> GraspPoint:
+    def _yielding(self, load: np.ndarray, pose: Pose) -> np.ndarray:
+        """The load less what a support that is going soft carries of it."""
+        if self._stood is None or self._stiffness == 0.0:
+            return load
+        shift = (pose.position - self._stood.position) / self.hand.length
+        turn = turn_between(self._stood, pose)
+        return load - self._stiffness * np.concatenate([shift, turn])
+
+    def _moved(self, at: GraspPoint, step: Step, load: np.ndarray) -> GraspPoint:
         hand = self.hand
         turn = max(
             float(np.abs(part).max()) * problem.largest_scale
@@ -208,7 +232,7 @@ class Path:
             y = point.at.y + size * step.fingers[index]
             tensions = multipliers[:count]
             parts.append(block(hand, index, self.body, pose, y, tensions, forces, hold))
-        return gather(hand, pose, parts, at.load, self.free)
+        return gather(hand, pose, parts, self._yielding(load, pose), self.free)
 
 
 def displaced(pose: Pose, motion: np.ndarray, length: float) -> Pose:
@@ -218,3 +242,14 @@ def displaced(pose: Pose, motion: np.ndarray, length: float) -> Pose:
     k = skew(axis)
     turn = np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * (k @ k)
     return Pose(pose.position + length * motion[:3], quaternion_from_matrix(turn @ pose.rotation))
+
+
+def turn_between(start: Pose, end: Pose) -> np.ndarray:
+    """Return the rotation vector (3,) from one orientation to another, in their common frame."""
+    turn = end.rotation @ start.rotation.T
+    axis = 0.5 * np.array(
+        [turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]]
+    )
+    sine, cosine = float(np.linalg.norm(axis)), 0.5 * (float(np.trace(turn)) - 1.0)
+    angle = float(np.arctan2(sine, cosine))
+    return axis * (angle / sine) if sine > 1e-12 else axis

@@ -161,7 +161,7 @@ class GraspSolver:
             load = self._point.load
             carried = self._point.unbalanced + load
             way.point = gather(self.hand, self.body.pose, self._point.blocks, carried)
-            self._path(free=True).walk(way, self._pulls, load)
+            self._path(free=True).walk(way, self._pulls, load, stood=self.body.pose)
         if way.reached is None:
             self.supported = False
             self._accept(way.point, self._pulls)
