@@ -8,6 +8,7 @@ import time
 import pytest
 
 from ccr_ros.cli.main import main
+from ccr_ros.stack import up
 from ccr_ros.stack.parts import Part
 from ccr_ros.stack.processes import Children, SignalGuard
 from ccr_ros.stack.up import Plan, Stack, arguments_for, keep_up, node_part
@@ -100,6 +101,19 @@ def test_a_node_is_given_its_arguments():
     assert words[:5] == ("--ros-args", "-r", "__ns:=/left", "--params-file", "p.yaml")
     assert words[5:] == ("-p", 'gripper_file:="1e3"', "-p", "rate:=2.5", "--x")
     assert node_part("solver_node").program == ("ccr_ros.cli", "run", "solver_node")
+
+
+@pytest.mark.parametrize("words", [[], ["--mode", "gripper"]])
+def test_the_mode_reaches_the_solver(words, monkeypatch):
+    plans = []
+    real = up.Plan
+    monkeypatch.setattr(up, "Plan", lambda **parts: plans.append(real(**parts)) or plans[-1])
+    monkeypatch.setattr(up, "keep_up", lambda stack, signals: 0)
+    assert main(["up", *words]) == 0
+    (plan,) = plans
+    assert ("mode:=gripper" in plan.arguments["solver_node"]) == bool(words)
+    others = (name for name in plan.arguments if name != "solver_node")
+    assert not any("mode:=" in word for name in others for word in plan.arguments[name])
 
 
 @pytest.mark.parametrize(
