@@ -111,7 +111,7 @@ def test_the_mode_reaches_the_solver(words, monkeypatch):
     monkeypatch.setattr(up, "keep_up", lambda stack, signals: 0)
     assert main(["up", *words]) == 0
     (plan,) = plans
-    assert ("mode:=gripper" in plan.arguments["solver_node"]) == bool(words)
+    assert ('mode:="gripper"' in plan.arguments["solver_node"]) == bool(words)
     others = (name for name in plan.arguments if name != "solver_node")
     assert not any("mode:=" in word for name in others for word in plan.arguments[name])
 
