@@ -26,6 +26,7 @@ from typing import Any
 import numpy as np
 
 from ccr_ros.cli.design.pulls_report import as_json, print_answer, print_path, write_path
+from ccr_ros.cli.design.written import print_files
 from ccr_ros.cli.options import number
 from ccr_ros.cli.solve import parse_pulls
 from ccr_ros.design.curve_files import UNITS
@@ -109,9 +110,7 @@ def run(args: argparse.Namespace) -> int:
         print_answer(found[0], planner.solver.rest_lengths)
     if args.plot:
         _plot(args, planner, targets, found)
-    for path, word in ((args.output, "written to"), (args.plot, "drawn in")):
-        if path and not args.json:
-            print(f"{word} {path}")
+    print_files(args)
     return 0 if all(f.reached for f in found) else 1
 
 

@@ -25,6 +25,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from ccr_ros.cli.design.curve_arguments import add_shape_arguments, wanted_from_args
+from ccr_ros.cli.design.written import print_files
 from ccr_ros.cli.options import integer, number
 from ccr_ros.cli.solve import parse_pull
 from ccr_ros.design.best_fit import BestFit, best_fit
@@ -120,10 +121,8 @@ def run(args: argparse.Namespace) -> int:
         from ccr_ros.viz.design_plot import plot_design
 
         plot_design(Path(args.plot), best.path.last, shape, rest=best.path.steps[0])
-    if not args.json and best is not None:
-        for word, path in (("written to", args.output), ("drawn in", args.plot)):
-            if path:
-                print(f"{word} {path}")
+    if best is not None:
+        print_files(args)
     return 0 if best is not None and best.path.reached else 1
 
 

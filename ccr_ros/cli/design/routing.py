@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from ccr_ros.cli.design.curve_arguments import add_shape_arguments, wanted_from_args
+from ccr_ros.cli.design.written import print_files
 from ccr_ros.cli.options import integer, number
 from ccr_ros.cli.solve import parse_pull
 from ccr_ros.design.pull import Pull
@@ -94,10 +95,7 @@ def run(args: argparse.Namespace) -> int:
 
         solver = FingerSolver(design.best.finger)
         plot_design(args.plot, design.best.solution, shape, rest=solver.rest)
-    if not args.json:
-        for word, path in (("written to", args.output), ("drawn in", args.plot)):
-            if path:
-                print(f"{word} {path}")
+    print_files(args)
     return 0 if design.reached else 1
 
 
