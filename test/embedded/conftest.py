@@ -147,3 +147,53 @@ def program():
         if one.process.poll() is None:
             one.process.kill()
             one.process.wait()
+
+
+# For tests of the transports alone
+
+
+@pytest.fixture(params=["cyclone", "local"])
+def participant_class(request):
+    """The participants of one transport after the other."""
+    from embedded_ros.transport import available_transports
+    from embedded_ros.transport.local import LocalParticipant
+
+    if request.param == "local":
+        return LocalParticipant
+    if "cyclone" not in available_transports():
+        pytest.skip("cyclonedds is not installed")
+    from embedded_ros.transport.cyclone import CycloneParticipant
+
+    return CycloneParticipant
+
+
+@pytest.fixture
+def join(participant_class):
+    """Return a function that makes participants, which leave with the test."""
+    made = []
+
+    def join(domain_id=None):
+        domain_id = int(os.environ["ROS_DOMAIN_ID"]) if domain_id is None else domain_id
+        made.append(participant_class(domain_id))
+        return made[-1]
+
+    yield join
+    for participant in made:
+        participant.close()
+
+
+@pytest.fixture
+def ends(join):
+    """Return a function that makes a writer and a reader of two participants."""
+    from transport_ends import HASH, TOPIC, TYPE
+
+    from embedded_ros.transport import Qos
+
+    one, two = join(), join()
+
+    def ends(offered=None, wanted=None, topic=TOPIC, type_hash=HASH):
+        writer = one.create_writer(topic, TYPE, HASH, offered or Qos(), "clientid=1;")
+        reader = two.create_reader(topic, TYPE, type_hash, wanted or offered or Qos())
+        return writer, reader
+
+    return ends
