@@ -2,6 +2,9 @@
 """Gives every test process its own ROS graph, and rclpy, before any test module is imported."""
 
 import os
+import signal
+from collections import Counter
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
@@ -21,14 +24,36 @@ os.environ["ROS_PYTHON_CHECK_FIELDS"] = "1"  # real rclpy checks no field types 
 enable_ros()
 
 
+@pytest.fixture(scope="session", autouse=True)
+def interrupts():
+    """Have SIGINT reach the programs under test, also where a script runs pytest in the background.
+
+    A shell without job control has its background jobs ignore SIGINT, and their children with them.
+    """
+    before = signal.getsignal(signal.SIGINT)
+    if before == signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 def pytest_addoption(parser):
     """Offer what takes too long for every run."""
     parser.addoption("--soak", action="store_true", help="run the tests that take ten minutes")
 
 
 def pytest_collection_modifyitems(config, items):
-    """Leave out what takes ten minutes, and what the transport in use cannot do."""
+    """Leave out what takes ten minutes, and what the transport in use cannot do.
+
+    Files that have much to do come first: at the end, workers would wait for the last of them.
+    """
     import rclpy
+
+    weights: Counter[Path] = Counter()
+    for item in items:
+        for marker, weight in (("long", 3), ("processes", 1)):
+            weights[item.path] += weight * (item.get_closest_marker(marker) is not None)
+    items.sort(key=lambda item: -weights[item.path])
 
     rmw = rclpy.get_rmw_implementation_identifier()
     for item in items:
