@@ -83,7 +83,7 @@ setup(
         "all": [requirement for feature in FEATURES.values() for requirement in feature],
         "dev": [
             "pytest>=8,<10",
-            "pytest-xdist>=3.5,<4",
+            "pytest-xdist>=3.7,<4",
             "pytest-timeout>=2.2,<3",
             "hypothesis>=6.98,<7",
             "mcap-ros2-support>=0.5,<1",

@@ -178,3 +178,12 @@ def test_test_says_where_the_tests_are(monkeypatch, tmp_path):
     monkeypatch.setattr(test_command, "__file__", str(tmp_path / "ccr_ros" / "cli" / "test.py"))
     with pytest.raises(CcrError, match="in the repository"):
         test_command._checkout()
+
+
+def test_sources_are_compiled_once_and_not_where_the_user_wants_none(monkeypatch):
+    monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")
+    environment = test_command._pytest_environment("/scratch")
+    assert "PYTHONDONTWRITEBYTECODE" not in environment
+    assert environment["PYTHONPYCACHEPREFIX"] == "/scratch"
+    monkeypatch.delenv("PYTHONDONTWRITEBYTECODE")
+    assert test_command._pytest_environment("/scratch") == dict(os.environ)

@@ -12,6 +12,7 @@ import os
 import re
 import subprocess
 import sys
+import tempfile
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -107,10 +108,12 @@ def _lint_environment() -> dict[str, str]:
 
 def _pytest_command(fast: bool, rest: list[str]) -> list[str]:
     command = [sys.executable, "-m", "pytest"]
-    workers = min(MAX_WORKERS, os.cpu_count() or 1)
+    # One more than there are cores: many tests wait for other processes or for time to pass.
+    workers = min(MAX_WORKERS, (os.cpu_count() or 1) + 1)
     if workers > 1 and not any(NO_XDIST.match(word) for word in rest):
-        # By file: fixtures that start processes stay with the tests that share them.
-        command += ["-n", str(workers), "--dist", "loadfile"]
+        # By file: fixtures that start processes stay with the tests that share them. In the order
+        # of test/conftest.py, which knows what takes long, not by the number of tests.
+        command += ["-n", str(workers), "--dist", "loadfile", "--no-loadscope-reorder"]
     if fast:
         command += ["-m", "not long"]
     if real_ros():
@@ -127,15 +130,34 @@ def _pytest(command: list[str], root: Path) -> tuple[int, str]:
         code = subprocess.run(command, cwd=root, check=False).returncode
         return code, f"pytest ended with exit code {code}"
     count = "pytest printed no count"
-    with subprocess.Popen(
-        command, cwd=root, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
-    ) as process:
+    with (
+        tempfile.TemporaryDirectory(prefix="ccr_test_") as scratch,
+        subprocess.Popen(
+            command,
+            cwd=root,
+            env=_pytest_environment(scratch),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        ) as process,
+    ):
         for line in process.stdout or ():
             print(line, end="", flush=True)
             plain = ANSI.sub("", line).strip("= \n")
             if PYTEST_COUNT.search(plain):
                 count = plain
     return process.returncode, count
+
+
+def _pytest_environment(scratch: str) -> dict[str, str]:
+    """Return an environment in which compiled sources are kept, if need be for this run alone.
+
+    The tests start hundreds of processes, each of which would compile all that it imports.
+    """
+    environment = dict(os.environ)
+    if environment.pop("PYTHONDONTWRITEBYTECODE", ""):
+        environment["PYTHONPYCACHEPREFIX"] = scratch
+    return environment
 
 
 def _say(title: str) -> None:
