@@ -16,7 +16,7 @@ ROOT = Path(__file__).parents[2]
 TALKER, LISTENER = (
     Path(__file__).parent / "programs" / f"{name}.py" for name in ("talker", "listener")
 )
-LONG, SHORT = "60", "4"  # s; how long a message is waited for, or not expected
+LONG, SHORT = "60", "2"  # s; how long a message is waited for, or not expected
 
 # A talker in the background and a listener beside it, where there is nothing but a loopback.
 ALONE = 'ip link set lo up && { "$0" "$1" >/dev/null & talker=$!; "$0" "$2" "$3"; kill $talker; }'

@@ -74,10 +74,8 @@ def test_signals_end_whatever_waits(program, how, number):
 
 
 @embedded_only  # real rclpy leaves a second signal to chance
-@pytest.mark.parametrize("pause", [0.0, 0.01, 0.03])
-@pytest.mark.parametrize(
-    "numbers", [(signal.SIGINT,) * 2, (signal.SIGTERM,) * 2, (signal.SIGTERM, signal.SIGINT)]
-)
+@pytest.mark.parametrize("pause", [0.0, 0.03])
+@pytest.mark.parametrize("numbers", [(signal.SIGINT,) * 2, (signal.SIGTERM, signal.SIGINT)])
 def test_a_second_signal_while_ending_changes_nothing(program, numbers, pause):
     talker = program("talker.py")
     talker.wait_for_line("ready")
@@ -94,7 +92,7 @@ def test_a_killed_process_is_forgotten_and_can_come_back(node, spin, program):
     limit = 8 if EMBEDDED else 30  # s; real ROS 2 forgets after ten and more
     got = []
     node.create_subscription(String, "chatter", got.append, 10)
-    for _ in range(3):
+    for _ in range(2):
         talker = program("talker.py")
         seen = len(got)
         assert spin(lambda: "talker" in node.get_node_names() and len(got) > seen, node)  # noqa: B023

@@ -25,7 +25,7 @@ def chain(context, probe, start_bridge, servos):
     stack.close()
 
 
-def test_calibrate_grasp_hold_release(chain, servos):
+def test_calibrate_grasp_stop_hold_release(chain, servos):
     stack = chain.ready()
     stack.show(BALL)
     result = stack.grasp(object="ball", force=0.2).result()
@@ -34,13 +34,7 @@ def test_calibrate_grasp_hold_release(chain, servos):
         assert finger.force == pytest.approx(0.2, abs=0.021)
         # The servos feel what the solver says: 0.2 N on the ball are 7.2 N in the cable.
         assert finger.tensions[0] == pytest.approx(7.2, abs=0.5)
-    assert stack.release(fast=True).result().released
 
-
-def test_the_servos_stopped_while_it_holds(chain, servos):
-    stack = chain.ready()
-    stack.show(BALL)
-    assert stack.grasp(object="ball", force=0.2).result().reached
     assert servos.trigger("stop").success
     stack.until_state("fault", "servo bridge: stopped")
     before = {name: servos.joint(f"{name}_main").pull for name in FINGERS}
@@ -52,3 +46,4 @@ def test_the_servos_stopped_while_it_holds(chain, servos):
     stack.probe.until(lambda: stack.now.object_held, "the object held")
     after = {name: servos.joint(f"{name}_main").pull for name in FINGERS}
     assert all(math.isclose(before[n], after[n], abs_tol=2e-4) for n in FINGERS)
+    assert stack.release(fast=True).result().released

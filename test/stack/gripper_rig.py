@@ -137,7 +137,9 @@ class Rig:
         assert result.successful, result.reason
 
     def grasp(self, force=0.3):
-        succeeded, result = self.act(self.grasp_client, Grasp.Goal(object="ball", force=force))
+        succeeded, result = self.act(
+            self.grasp_client, Grasp.Goal(object="ball", force=force, timeout=50.0)
+        )
         assert succeeded and result.reached, result.message
         return result
 

@@ -14,11 +14,24 @@ pytestmark = [pytest.mark.processes, pytest.mark.long]
 KEPT = 1e-4  # m; a pull that is held changes by less
 
 
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory, request):
+    """A gripper that tests share, as starting and grasping take long."""
+    with rigs(tmp_path_factory.mktemp("rig"), "/gripper", patience=request.param) as (rig,):
+        yield rig
+
+
+# Silence of others that the coordinator bears [s]: as the machine may be busy, or its default.
+patient = pytest.mark.parametrize("rig", [10.0], indirect=True, ids=["patient"])
+strict = pytest.mark.parametrize("rig", [None], indirect=True, ids=["strict"])
+
+
 def held(rig, force=0.3):
-    """Grasp the ball and leave it to the fingers."""
-    rig.grasp(force)
-    rig.set_ball("supported", False)
-    rig.until(lambda: near(rig, force), f"{force} N after the stand was taken away")
+    """Have the ball in the fingers alone, grasped now or by the test before."""
+    if rig.gripper.state != GripperState.HOLDING:
+        rig.grasp(force)
+        rig.set_ball("supported", False)
+        rig.until(lambda: near(rig, force), f"{force} N without the stand")
 
 
 def near(rig, force, tolerance=0.03):
@@ -32,88 +45,93 @@ def keeps_its_pulls(rig, seconds, before):
     return all(abs(after[name] - before[name]) < KEPT for name in FINGERS)
 
 
-def test_grasp_hold_more_weight_release(tmp_path):
-    with rigs(tmp_path, "/gripper") as (rig,):
-        result = rig.grasp(0.3)
-        assert {f.finger for f in result.fingers} == set(FINGERS)
-        assert all(f.in_contact and f.effort_agrees for f in result.fingers)
-        assert rig.gripper.state == GripperState.HOLDING and rig.gripper.object_held
-        rig.set_ball("supported", False)
-        rig.until(lambda: near(rig, 0.3), "the force, with the ball in the fingers alone")
-        rig.set_ball("mass", 0.03)
-        rig.spin(1.0)
-        rig.until(lambda: near(rig, 0.3), "the force, with the heavier ball")
-        assert rig.gripper.state == GripperState.HOLDING
-        begin = time.monotonic()
-        future = rig.begin(rig.release_client, Release.Goal(delay=1.5))
-        rig.until(lambda: rig.gripper.release_in > 0, "a release that waits")
-        assert rig.gripper.state == GripperState.HOLDING
-        assert rig.answer(future, "the release").result.released
-        assert time.monotonic() - begin > 1.5
-        rig.until(lambda: rig.gripper.state == GripperState.READY, "an open gripper")
-        assert max(rig.measured().values()) < 3e-4
+@patient
+def test_grasp_hold_more_weight(rig):
+    result = rig.grasp(0.3)
+    assert {f.finger for f in result.fingers} == set(FINGERS)
+    assert all(f.in_contact and f.effort_agrees for f in result.fingers)
+    assert rig.gripper.state == GripperState.HOLDING and rig.gripper.object_held
+    rig.set_ball("supported", False)
+    rig.until(lambda: near(rig, 0.3), "the force, with the ball in the fingers alone")
+    rig.set_ball("mass", 0.03)
+    rig.spin(1.0)
+    rig.until(lambda: near(rig, 0.3), "the force, with the heavier ball")
+    assert rig.gripper.state == GripperState.HOLDING
 
 
-def test_solver_killed_while_holding(tmp_path):
-    with rigs(tmp_path, "/gripper", patience=None) as (rig,):
-        held(rig)
-        before = rig.measured()
-        rig.kill("solver_node")
-        took = rig.until(lambda: "solver" in rig.gripper.message, "word of the solver's silence")
-        print(f"told after {took:.2f} s")
-        assert rig.gripper.state == GripperState.FAULT
-        assert keeps_its_pulls(rig, 2.0, before)
-        rig.start("solver_node")
-        comes_back(rig)
+@patient
+def test_coordinator_killed_while_holding(rig):
+    held(rig)
+    before = rig.measured()
+    rig.gripper = None
+    rig.kill("gripper_coordinator_node")
+    took = rig.until(lambda: all(j.stale for j in rig.servos.joints), "word of stale commands")
+    print(f"told after {took:.2f} s")
+    assert rig.servos.state == ServoState.ACTIVE
+    assert keeps_its_pulls(rig, 2.0, before)
+    rig.start("gripper_coordinator_node")
+    rig.until(
+        lambda: rig.gripper is not None and rig.gripper.state == GripperState.HOLDING,
+        "a coordinator that finds its grip again",
+    )
+    assert rig.gripper.object_held
+    assert keeps_its_pulls(rig, 1.0, before)
 
 
-def test_coordinator_killed_while_holding(tmp_path):
-    with rigs(tmp_path, "/gripper") as (rig,):
-        held(rig)
-        before = rig.measured()
-        rig.gripper = None
-        rig.kill("gripper_coordinator_node")
-        took = rig.until(lambda: all(j.stale for j in rig.servos.joints), "word of stale commands")
-        print(f"told after {took:.2f} s")
-        assert rig.servos.state == ServoState.ACTIVE
-        assert keeps_its_pulls(rig, 2.0, before)
-        rig.start("gripper_coordinator_node")
-        rig.until(
-            lambda: rig.gripper is not None and rig.gripper.state == GripperState.HOLDING,
-            "a coordinator that finds its grip again",
-        )
-        assert rig.gripper.object_held
-        assert keeps_its_pulls(rig, 1.0, before)
+@patient
+def test_a_release_that_waits(rig):
+    held(rig)
+    begin = time.monotonic()
+    future = rig.begin(rig.release_client, Release.Goal(delay=1.5))
+    rig.until(lambda: rig.gripper.release_in > 0, "a release that waits")
+    assert rig.gripper.state == GripperState.HOLDING
+    assert rig.answer(future, "the release").result.released
+    assert time.monotonic() - begin > 1.5
+    rig.until(lambda: rig.gripper.state == GripperState.READY, "an open gripper")
+    assert max(rig.measured().values()) < 3e-4
 
 
-def test_servo_bridge_killed_while_holding(tmp_path):
-    with rigs(tmp_path, "/gripper", patience=None) as (rig,):
-        held(rig)
-        before = rig.measured()
-        rig.kill("servo_bridge_node")
-        took = rig.until(lambda: "servo bridge" in rig.gripper.message, "word of the bridge")
-        print(f"told after {took:.2f} s")
-        assert rig.gripper.state == GripperState.FAULT
-        rig.pulls.clear()
-        rig.start("servo_bridge_node")
-        rig.until(lambda: len(rig.pulls) == 3, "measured pulls")
-        assert keeps_its_pulls(rig, 1.0, before)  # the servos are where they were
-        comes_back(rig)
+@strict
+def test_solver_killed_while_holding(rig):
+    held(rig)
+    before = rig.measured()
+    rig.kill("solver_node")
+    took = rig.until(lambda: "solver" in rig.gripper.message, "word of the solver's silence")
+    print(f"told after {took:.2f} s")
+    assert rig.gripper.state == GripperState.FAULT
+    assert keeps_its_pulls(rig, 2.0, before)
+    rig.start("solver_node")
+    comes_back(rig)
+
+
+@strict
+def test_servo_bridge_killed_while_holding(rig):
+    held(rig)
+    before = rig.measured()
+    rig.kill("servo_bridge_node")
+    took = rig.until(lambda: "servo bridge" in rig.gripper.message, "word of the bridge")
+    print(f"told after {took:.2f} s")
+    assert rig.gripper.state == GripperState.FAULT
+    rig.pulls.clear()
+    rig.start("servo_bridge_node")
+    rig.until(lambda: len(rig.pulls) == 3, "measured pulls")
+    assert keeps_its_pulls(rig, 1.0, before)  # the servos are where they were
+    comes_back(rig)
+    succeeded, result = rig.release(fast=True)
+    assert succeeded and result.released
 
 
 def comes_back(rig):
-    """Reset, hold, let go: all as before."""
+    """Reset, hold: all as before."""
     rig.until(lambda: rig.call("reset").success, "a reset")
     rig.until(lambda: rig.call("hold").success, "a hold")
     rig.until(lambda: rig.gripper.state == GripperState.HOLDING, "holding again")
-    succeeded, result = rig.release(fast=True)
-    assert succeeded and result.released
 
 
 def test_two_grippers_at_once(tmp_path):
     with rigs(tmp_path, "/left", "/right") as (left, right):
         goals = [
-            (rig, rig.begin(rig.grasp_client, Grasp.Goal(object="ball", force=0.3)))
+            (rig, rig.begin(rig.grasp_client, Grasp.Goal(object="ball", force=0.3, timeout=50.0)))
             for rig in (left, right)
         ]
         for rig, future in goals:
