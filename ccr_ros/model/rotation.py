@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -64,6 +66,20 @@ def quaternion_from_matrix(rotation: np.ndarray) -> np.ndarray:
     return q.reshape(*m.shape[:-2], 4)
 
 
+def quaternion_product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return the quaternion (4,), w >= 0, of the rotation b followed by a, both (x, y, z, w)."""
+    ax, ay, az, aw = a.tolist()
+    bx, by, bz, bw = b.tolist()
+    product = (
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+        aw * bw - ax * bx - ay * by - az * bz,
+    )
+    size = math.copysign(math.hypot(*product), product[3])
+    return np.array([value / size for value in product])
+
+
 @dataclass(frozen=True, eq=False)
 class Pose:
     """A rigid pose: the position and orientation of one frame in another.
@@ -82,10 +98,12 @@ class Pose:
         )
         object.__setattr__(self, "orientation", checks.quaternion("orientation", self.orientation))
 
-    @property
+    @cached_property
     def rotation(self) -> np.ndarray:
         """Rotation matrix (3, 3): columns are the frame's axes in the outer frame."""
-        return matrix_from_quaternion(self.orientation)
+        rotation = matrix_from_quaternion(self.orientation)
+        rotation.setflags(write=False)  # it is kept
+        return rotation
 
     def points(self, points: np.ndarray) -> np.ndarray:
         """Map points (..., 3) from this frame to the outer one."""
@@ -102,5 +120,5 @@ class Pose:
 
     def __matmul__(self, other: Pose) -> Pose:
         """Compose: ``a @ b`` is the pose of b's frame in a's outer frame."""
-        q = quaternion_from_matrix(self.rotation @ other.rotation)
-        return Pose(self.points(other.position), q)
+        turned = quaternion_product(self.orientation, other.orientation)
+        return Pose(self.points(other.position), turned)

@@ -42,11 +42,13 @@ class KktPoint:
         at, first: Values and first derivatives.
         tensions: (C,) multipliers of the lengths.
         forces: (O, P) multipliers of the contacts.
-        pairs: (c, 2) contact candidates (obstacle, point); normals: (c, 3) of the obstacle there.
+        pairs: (c, 2) contact candidates (obstacle, point).
+        normals: (c, 3) of the obstacle there; curvatures: (c, 3, 3) its distance's Hessian, in 1/L.
         rows: (C + c, N) constraint gradients, lengths first.
         values: (C + c,) constraint values: lengths, and negative distances.
         multipliers: (C + c,) tensions and the candidates' forces.
         hessian: (N, N) Hessian of the Lagrangian, exact.
+        unbalanced: (N,) generalised forces left over, without ``pushes`` (see `derive`).
         residual: Largest unbalanced generalised force, relative to the largest elastic one or 1.
     """
 
@@ -56,10 +58,12 @@ class KktPoint:
     forces: np.ndarray
     pairs: np.ndarray
     normals: np.ndarray
+    curvatures: np.ndarray
     rows: np.ndarray
     values: np.ndarray
     multipliers: np.ndarray
     hessian: np.ndarray
+    unbalanced: np.ndarray
     residual: float
 
     @property
@@ -137,11 +141,12 @@ def derive(
         values = np.concatenate([values, -at.distances[index]])
         multipliers = np.concatenate([tensions, pressing])
     hessian = problem.hessian(at, first, tensions, pairs, normals, curvatures, pressing, pushes)
-    unbalanced = np.abs(at.y + multipliers @ rows).max()
-    residual = float(unbalanced / max(1.0, np.abs(at.y).max()))
+    unbalanced = at.y + multipliers @ rows
+    residual = float(np.abs(unbalanced).max() / max(1.0, np.abs(at.y).max()))
     return KktPoint(
-        at, first, tensions, forces, pairs, normals, rows, values, multipliers, hessian, residual
-    )
+        at, first, tensions, forces, pairs, normals, curvatures, rows, values, multipliers,
+        hessian, unbalanced, residual,
+    )  # fmt: skip
 
 
 def _candidates(problem: EquilibriumProblem, at: Evaluation, forces: np.ndarray) -> np.ndarray:

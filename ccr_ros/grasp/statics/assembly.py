@@ -29,7 +29,7 @@ import numpy as np
 
 from ccr_ros.model.equilibrium import EquilibriumProblem
 from ccr_ros.model.files import MountedFinger
-from ccr_ros.model.rotation import Pose, quaternion_from_matrix, skew
+from ccr_ros.model.rotation import Pose, cross, skew
 from ccr_ros.model.settings import SolverSettings
 from ccr_ros.model.sqp import KktPoint, derive
 
@@ -60,20 +60,17 @@ class Hand:
         self.weights = np.array(
             [m.finger.bending_stiffness / m.finger.length / self.energy for m in fingers]
         )
-        self._turns = [m.base.rotation for m in fingers]
-        self._bases = [m.base for m in fingers]
+        self._to_base = [m.base.inverse() for m in fingers]
         self._frames = []
-        for mounted, turn in zip(self.mounted, self._turns, strict=True):
-            frame = np.zeros((6, 6))
+        for mounted in self.mounted:
+            frame, turn = np.zeros((6, 6)), mounted.base.rotation
             frame[:3, :3] = turn.T * (self.length / mounted.finger.length)
             frame[3:, 3:] = turn.T
             self._frames.append(frame)
 
     def in_base(self, index: int, pose: Pose) -> Pose:
         """Return a pose of the gripper's frame in the base frame of a finger."""
-        turn, base = self._turns[index], self._bases[index]
-        position = (pose.position - base.position) @ turn
-        return Pose(position, quaternion_from_matrix(turn.T @ pose.rotation))
+        return self._to_base[index] @ pose
 
     def frame(self, index: int) -> np.ndarray:
         """Return (6, 6) from a motion q to that in a finger's base frame and units."""
@@ -109,7 +106,9 @@ class FingerBlock:
     def on_object(self) -> np.ndarray:
         """(6,) force and moment that the finger leaves over on the object, in its own units."""
         total = self.point.multipliers @ self.columns
-        return total + np.einsum("gi,gij->j", self.friction.forces, self.friction.columns)
+        if len(self.friction):
+            total = total + self.friction.forces.ravel() @ self.friction.columns.reshape(-1, 6)
+        return total
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,8 +160,7 @@ def block(
     pushes = pushes_in_base(hold, local.rotation, forces[-1]) if body.friction > 0 else None
     point = derive(problem, problem.evaluate(y), tensions, forces, pushes)
     lengths = len(point.tensions)
-    at_object = np.flatnonzero(point.pairs[:, 0] == len(own)) if len(point.pairs) else np.empty(0)
-    touch = at_object.astype(int)
+    touch = np.flatnonzero(point.pairs[:, 0] == len(own))
     columns = np.zeros((len(point.rows), 6))
     border, corner = np.zeros((problem.size, 6)), np.zeros((6, 6))
     frame = hand.frame(index)
@@ -170,7 +168,7 @@ def block(
         where = point.pairs[touch, 1]
         arms = point.at.points[where] - local.position / problem.finger.length
         normals = point.normals[touch]
-        pushed = np.concatenate([normals, np.cross(arms, normals)], axis=1)
+        pushed = np.concatenate([normals, cross(arms, normals)], axis=1)
         columns[lengths + touch] = pushed @ frame
         pressed = np.flatnonzero(point.multipliers[lengths + touch] > 0)
         if len(pressed):
@@ -179,8 +177,9 @@ def block(
             if pushes is not None:
                 whole = whole + pushes[where[pressed]]
             _second_order(
-                problem, point, where[pressed], arms[pressed], force, whole, border, corner
-            )
+                point.first.points[where[pressed]], point.curvatures[touch[pressed]],
+                arms[pressed], force, whole, border, corner,
+            )  # fmt: skip
             border, corner = border @ frame, frame.T @ corner @ frame
     parts = (point, lengths + touch, columns, border, corner)
     return _with_friction(hand, index, body, parts, hold, local)
@@ -205,16 +204,16 @@ def _with_friction(
     rows = friction_rows(
         point, touch, hold, body.friction, centre, place.rotation, hand.frame(index)
     )
-    unbalanced = point.at.y + point.multipliers @ point.rows
+    unbalanced = point.unbalanced
     if len(rows):
-        unbalanced = unbalanced + np.einsum("gi,gin->n", rows.forces, rows.rows)
+        along = rows.rows.reshape(-1, len(unbalanced))
+        unbalanced = unbalanced + rows.forces.ravel() @ along
     return FingerBlock(*parts, hold, rows, place, unbalanced)
 
 
 def _second_order(
-    problem: EquilibriumProblem,
-    point: KktPoint,
-    where: np.ndarray,
+    jacobian: np.ndarray,
+    curvatures: np.ndarray,
     arms: np.ndarray,
     force: np.ndarray,
     whole: np.ndarray,
@@ -225,19 +224,18 @@ def _second_order(
 
     ``whole`` (k, 3) are the contacts' forces on the finger, friction included.
     """
-    _, hessians = problem.obstacles[-1].derivatives(point.at.points[where] * problem.finger.length)
-    hessians = hessians * (problem.finger.length * force)[:, None, None]
-    motion = np.concatenate([np.tile(-_EYE, (len(arms), 1, 1)), skew(arms)], axis=2)  # u by q
+    hessians = curvatures * force[:, None, None]
+    motion = np.empty((len(arms), 3, 6))  # of u by q
+    motion[:, :, :3], motion[:, :, 3:] = -_EYE, skew(arms)
     bent = hessians @ motion
     by_point = bent.copy()
     by_point[:, :, 3:] -= skew(whole)
-    jacobian = point.first.points[where]
-    border -= np.einsum("kin,kij->nj", jacobian, by_point)
-    corner -= np.einsum("kai,kaj->ij", motion, bent)
-    turned = skew(whole).sum(axis=0)
+    border -= jacobian.reshape(-1, jacobian.shape[2]).T @ by_point.reshape(-1, 6)
+    corner -= motion.reshape(-1, 6).T @ bent.reshape(-1, 6)
+    turned = skew(whole.sum(axis=0))
     corner[:3, 3:] -= turned
     corner[3:, :3] -= turned.T
-    outer = np.einsum("ki,kj->ij", whole, arms)
+    outer = whole.T @ arms
     corner[3:, 3:] -= 0.5 * (outer + outer.T) - np.trace(outer) * _EYE
 
 

@@ -18,9 +18,11 @@ A point that comes to touch within a step has no friction in that step.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
+from ccr_ros.model.rotation import cross
 from ccr_ros.model.sqp import ACTIVE, KktPoint
 
 RHO = 100.0  # force per way, in units of EI / L^3; about thirty times a finger's own stiffness
@@ -99,9 +101,14 @@ class FrictionRows:
 def tangents_of(normals: np.ndarray) -> np.ndarray:
     """Return (g, 2, 3) unit tangents, normal to each other, for unit normals (g, 3)."""
     least = np.eye(3)[np.argmin(np.abs(normals), axis=1)]
-    first = np.cross(normals, least)
+    first = cross(normals, least)
     first /= np.linalg.norm(first, axis=1)[:, None]
-    return np.stack([first, np.cross(normals, first)], axis=1)
+    return np.stack([first, cross(normals, first)], axis=1)
+
+
+def _times(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Return (g, 2) of matrices (g, 2, 3) and vectors (g, 3), one each."""
+    return (matrices @ vectors[:, :, None])[:, :, 0]
 
 
 def pushes_in_base(hold: Hold, turn: np.ndarray, forces: np.ndarray) -> np.ndarray | None:
@@ -116,6 +123,16 @@ def pushes_in_base(hold: Hold, turn: np.ndarray, forces: np.ndarray) -> np.ndarr
     if not pressed.any():
         return None
     return np.where(pressed[:, None], hold.pushes @ turn.T, 0.0)
+
+
+@lru_cache(maxsize=16)
+def _none(size: int) -> FrictionRows:
+    """No contacts with friction, of a finger of so many coordinates."""
+    none, two = np.empty(0, dtype=int), np.empty((0, 2))
+    return FrictionRows(
+        none, none, np.empty((0, 2, 3)), np.empty((0, 2, size)), np.empty((0, 2, 6)),
+        two, two, np.empty(0), np.empty(0, dtype=bool),
+    )  # fmt: skip
 
 
 def friction_rows(
@@ -138,23 +155,19 @@ def friction_rows(
         turn: (3, 3) the object's orientation in the base frame.
         frame: (6, 6) from q to the object's motion in base frame and finger's units.
     """
+    if friction <= 0 or not len(touch):
+        return _none(point.rows.shape[1])
     lengths = len(point.tensions)
-    where = point.pairs[touch - lengths, 1] if len(touch) else np.empty(0, dtype=int)
-    held = hold.anchored[where] & (point.multipliers[touch] > ACTIVE) & (friction > 0)
+    where = point.pairs[touch - lengths, 1]
+    held = hold.anchored[where] & (point.multipliers[touch] > ACTIVE)
     index, where = touch[held], where[held]
-    size = point.rows.shape[1]
     if not len(index):
-        none = np.empty(0, dtype=int)
-        two = np.empty((0, 2))
-        return FrictionRows(
-            none, none, np.empty((0, 2, 3)), np.empty((0, 2, size)), np.empty((0, 2, 6)),
-            two, two, np.empty(0), np.empty(0, dtype=bool),
-        )  # fmt: skip
+        return _none(point.rows.shape[1])
     tangents = tangents_of(point.normals[index - lengths])
     arms = point.at.points[where] - centre
-    ways = -np.einsum("gij,gj->gi", tangents, arms - hold.anchors[where] @ turn.T)
-    forces = np.einsum("gij,gj->gi", tangents, hold.pushes[where] @ turn.T)
-    moved = np.concatenate([tangents, np.cross(arms[:, None, :], tangents)], axis=2)
+    ways = -_times(tangents, arms - hold.anchors[where] @ turn.T)
+    forces = _times(tangents, hold.pushes[where] @ turn.T)
+    moved = np.concatenate([tangents, cross(arms[:, None, :], tangents)], axis=2)
     limits = friction * point.multipliers[index]
     size_of = np.linalg.norm(forces + RHO * ways, axis=1)
     edge = np.where(hold.slipping[where], -_EDGE, 1e-12)
@@ -162,7 +175,7 @@ def friction_rows(
         index=index,
         where=where,
         tangents=tangents,
-        rows=-np.einsum("gij,gjn->gin", tangents, point.first.points[where]),
+        rows=-tangents @ point.first.points[where],
         columns=moved @ frame,
         ways=ways,
         forces=forces,

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ccr_ros.model.result import meeting_disks
-from ccr_ros.model.rotation import Pose, quaternion_from_matrix, skew
+from ccr_ros.model.rotation import Pose, quaternion_product
 from ccr_ros.model.settings import SolverSettings
 from ccr_ros.model.sqp import ACTIVE, Bounds, violation
 
@@ -238,10 +238,10 @@ class Path:
 def displaced(pose: Pose, motion: np.ndarray, length: float) -> Pose:
     """Return the pose after a motion (translation in lengths, rotation vector) about its centre."""
     angle = float(np.linalg.norm(motion[3:]))
-    axis = motion[3:] / angle if angle > 0 else np.array([0.0, 0.0, 1.0])
-    k = skew(axis)
-    turn = np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * (k @ k)
-    return Pose(pose.position + length * motion[:3], quaternion_from_matrix(turn @ pose.rotation))
+    half = 0.5 * np.sinc(0.5 * angle / np.pi) * motion[3:]
+    turn = np.append(half, np.cos(0.5 * angle))
+    turned = quaternion_product(turn, pose.orientation)
+    return Pose(pose.position + length * motion[:3], turned)
 
 
 def turn_between(start: Pose, end: Pose) -> np.ndarray:
