@@ -71,21 +71,31 @@ def _null_space(point: KktPoint) -> np.ndarray:
 
 
 def make_solution(
-    problem: EquilibriumProblem, pulls: np.ndarray, walk: Walk, elapsed: Callable[[], float]
+    problem: EquilibriumProblem,
+    pulls: np.ndarray,
+    walk: Walk,
+    elapsed: Callable[[], float],
+    verdict: tuple[bool, float] | None = None,
 ) -> Solution:
-    """Assemble the solution that a walk towards ``pulls`` (m,) has ended at."""
+    """Assemble the solution that a walk towards ``pulls`` (m,) has ended at.
+
+    ``verdict``: whether it is stable, and the smallest eigenvalue, where that is not the finger's
+    own affair.
+    """
     point = walk.point
     finger, at, length = problem.finger, point.at, problem.finger.length
     force_unit = finger.bending_stiffness / length**2
     disks = np.arange(finger.segments + 1) * problem.arcs_per_segment
-    eigenvalue = smallest_eigenvalue(point)
+    if verdict is None:
+        eigenvalue = smallest_eigenvalue(point)
+        verdict = eigenvalue > _STABLE, eigenvalue
+    stable, eigenvalue = verdict
     z = at.z / problem.rod_step
     arcs = (finger.segments, problem.arcs_per_segment, problem.rod.order + 1, 3)
     metres = at.points * length
     names = finger.cable_names
     cable_error, penetration = _errors(problem, point, walk.pulls)
     converged = walk.reached is None
-    stable = eigenvalue > _STABLE
     certificate = Certificate(
         converged=converged,
         stable=stable,

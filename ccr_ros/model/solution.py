@@ -29,7 +29,8 @@ class Certificate:
             one by how much it is too long.
         penetration: Deepest penetration of an obstacle [m]; 0 if none.
         smallest_eigenvalue: Of the reduced Hessian, relative to the unloaded rod's own stiffness:
-            1 for a free rod at rest, 0 at a branch point, negative for a saddle.
+            1 for a free rod at rest, 0 at a branch point, negative for a saddle. nan in a grasp,
+            where it is that of the whole which counts.
         iterations: Number of QP steps taken, all sub-steps included.
         solve_time: Wall time [s].
         branch_jump: The pose could not be reached continuously from the last one: it lies on

@@ -290,7 +290,7 @@ class _Planner:
         """Why a solution may not be a waypoint, or nothing."""
         if not found.converged:
             return found.message
-        if found.smallest_eigenvalue < self.limits.stiffness:
+        if not found.stability.exceeds(self.limits.stiffness):
             return f"stability: {found.softest} at the slightest disturbance"
         for contact in found.contacts:
             if contact.status == "slip" or contact.margin < self.bounds.margin - 0.02:

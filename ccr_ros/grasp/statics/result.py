@@ -9,16 +9,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ccr_ros.model.errors import NotConverged
-from ccr_ros.model.result import make_solution, row_space
+from ccr_ros.model.result import make_solution
 from ccr_ros.model.solution import Solution
 from ccr_ros.model.sqp import ACTIVE, KktPoint
 
-from .assembly import FingerBlock, GraspPoint, Hand
+from .assembly import FingerBlock, Hand
 from .body import Body
 from .path import Way
-
-_STABLE = 1e-6
-_AXES = "xyz"
+from .stability import STABLE, Stability
 
 
 @dataclass
@@ -70,7 +68,8 @@ class GraspSolution:
     """Fingers and object in equilibrium.
 
     Attributes:
-        fingers: One per finger, each in its base frame, the object among its obstacles.
+        fingers: One per finger, each in its base frame, the object among its obstacles; that a
+            certificate is stable says so of the whole, its eigenvalue is nan.
         body: The object, at its pose in the gripper's frame.
         supported: Whether something beside the fingers carries the object.
         contacts: Where fingers press on the object.
@@ -79,9 +78,7 @@ class GraspSolution:
         converged: All residuals are within tolerance, and the wanted pulls and loads are reached.
         stable: The energy has a strict minimum here, but for motions that leave the object's
             surface as it is (a ball may turn).
-        smallest_eigenvalue: Of the Hessian reduced to what the constraints leave free, relative
-            to a free finger's stiffness; lengths in units of the first finger's.
-        softest: What moves most easily, in words.
+        stability: How much so; found out when it is asked for.
         residual: Largest unbalanced generalised force, relative to the largest elastic one.
         iterations, substeps: Newton and continuation steps.
         solve_time: Wall-clock [s].
@@ -97,14 +94,27 @@ class GraspSolution:
     net_moment: np.ndarray
     converged: bool
     stable: bool
-    smallest_eigenvalue: float
-    softest: str
+    stability: Stability
     residual: float
     iterations: int
     substeps: int
     solve_time: float
     dissipated: float = 0.0
     message: str = field(default="")
+
+    @property
+    def smallest_eigenvalue(self) -> float:
+        """Of the Hessian reduced to what the constraints leave free.
+
+        Relative to a free finger's stiffness; lengths in units of the first finger's. Takes longer
+        than a solve; whether it is above some value `Stability.exceeds` tells at once.
+        """
+        return self.stability.smallest_eigenvalue
+
+    @property
+    def softest(self) -> str:
+        """What moves most easily, in words; takes as long as `smallest_eigenvalue`."""
+        return self.stability.softest
 
     @property
     def margin(self) -> float:
@@ -138,22 +148,22 @@ def make_grasp_solution(
 ) -> GraspSolution:
     """Assemble the solution that a solve has ended at."""
     at = way.point
+    stability = Stability(hand, at, body, supported)
+    stable = stability.exceeds(STABLE)
     fingers = tuple(
         make_solution(
             problem,
             wanted,
             _FingerWay(_own_point(part), pulls, way.reached, way.iterations, way.substeps),
             elapsed=lambda: elapsed,
+            verdict=(stable, math.nan),
         )
         for problem, part, pulls, wanted in zip(
             hand.problems, at.blocks, way.pulls, target, strict=True
         )
     )
-    eigenvalue, direction = softest_direction(hand, at, body, supported)
     unit = np.array([hand.energy / hand.length] * 3 + [hand.energy] * 3)
     net = -at.unbalanced * unit
-    stable = eigenvalue > _STABLE
-    softest = "" if not len(direction) else _in_words(hand, at, direction, supported)
     return GraspSolution(
         fingers=fingers,
         body=body,
@@ -163,71 +173,14 @@ def make_grasp_solution(
         net_moment=net[3:],
         converged=way.reached is None,
         stable=stable,
-        smallest_eigenvalue=eigenvalue,
-        softest=softest,
+        stability=stability,
         residual=at.residual,
         iterations=way.iterations,
         substeps=way.substeps,
         solve_time=elapsed,
         dissipated=way.heat,
-        message=_message(way, stable, softest),
+        message=_message(way, "" if stable else stability.softest),
     )
-
-
-def softest_direction(
-    hand: Hand, at: GraspPoint, body: Body, supported: bool
-) -> tuple[float, np.ndarray]:
-    """Return the smallest eigenvalue of the reduced Hessian and its vector (fingers, then q)."""
-    sizes = [problem.size for problem in hand.problems]
-    total = sum(sizes) + 6
-    matrix, rows = np.zeros((total, total)), []
-    first = 0
-    for weight, part, size in zip(hand.weights, at.blocks, sizes, strict=True):
-        own = slice(first, first + size)
-        matrix[own, own] = weight * part.point.hessian
-        matrix[own, -6:] = weight * part.border
-        matrix[-6:, own] = matrix[own, -6:].T
-        matrix[-6:, -6:] += weight * part.corner
-        active, sticks = part.point.active, ~part.friction.slips
-        by_y = [part.point.rows[active], *part.friction.rows[sticks]]
-        by_q = [part.columns[active], *part.friction.columns[sticks]]
-        full = np.zeros((sum(map(len, by_y)), total))
-        full[:, own], full[:, -6:] = np.concatenate(by_y), np.concatenate(by_q)
-        rows.append(full)
-        first += size
-    # Neither what the support holds nor what changes nothing is a direction to fall in.
-    if supported:
-        held = np.eye(6)
-    else:
-        turn = at.pose.rotation
-        both = np.zeros((6, 6))
-        both[:3, :3], both[3:, 3:] = turn, turn
-        held = (both @ body.free_directions()).T
-    idle = np.zeros((len(held), total))
-    idle[:, -6:] = held
-    basis = row_space(np.concatenate([*rows, idle])) if len(held) or any(map(len, rows)) else None
-    if basis is None or basis.shape[1] == 0:
-        values, vectors = np.linalg.eigh(matrix)
-        return float(values[0]), vectors[:, 0]
-    null = np.linalg.qr(basis, mode="complete")[0][:, basis.shape[1] :]
-    values, vectors = np.linalg.eigh(null.T @ matrix @ null)
-    return float(values[0]), null @ vectors[:, 0]
-
-
-def _in_words(hand: Hand, at: GraspPoint, direction: np.ndarray, supported: bool) -> str:
-    """Say who moves most along a direction, and how."""
-    first, shares = 0, []
-    for problem, part, mounted in zip(hand.problems, at.blocks, hand.mounted, strict=True):
-        own = direction[first : first + problem.size]
-        tip = part.point.first.points[problem.points.backbone[-1]] @ own
-        shares.append((float(np.linalg.norm(tip)), f"the tip of {mounted.finger.name} moves"))
-        first += problem.size
-    if not supported:
-        shift, turn = direction[-6:-3], direction[-3:]
-        for way, word in ((shift, "moves along"), (turn, "turns about")):
-            axis = int(np.argmax(np.abs(way)))
-            shares.append((float(np.linalg.norm(way)), f"the object {word} {_AXES[axis]}"))
-    return max(shares)[1]
 
 
 def _own_point(part: FingerBlock) -> KktPoint:
@@ -275,12 +228,12 @@ def _contacts(hand: Hand, body: Body, way: Way) -> tuple[ObjectContact, ...]:
     return tuple(sorted(found, key=lambda c: (c.finger, c.disk, c.point, c.cable)))
 
 
-def _message(way: Way, stable: bool, softest: str) -> str:
+def _message(way: Way, falls: str) -> str:
     if way.reached is not None:
         return (
             f"no equilibrium of fingers and object was found beyond {way.reached:.1%} of the way"
             " to the wanted pulls and loads: the fingers cannot hold the object there"
         )
-    if not stable:
-        return f"the grasp is not stable: {softest} at the slightest disturbance"
+    if falls:
+        return f"the grasp is not stable: {falls} at the slightest disturbance"
     return ""
