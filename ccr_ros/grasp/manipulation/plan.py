@@ -23,7 +23,8 @@ from ccr_ros.model.rotation import Pose
 from .step import StepLimits, best_step, constraint_rows
 
 _ARM = 0.02  # m; as far from its centre a turn counts as much as a shift
-_ASIDE = 0.1  # weight of motions that were not asked for
+_SCALE = np.array([1.0] * 3 + [_ARM] * 3)
+_ASIDE = 0.4  # weight of motions that were not asked for
 _LEAST = 0.02  # share of a step's wanted motion below which nothing gets on any more
 _SHRINKS = 5  # times that a step is halved before it is given up
 
@@ -70,6 +71,7 @@ class MoveLimits:
         pulls: Lowest and highest pull (m, 2) [m] by finger, one row per cable; absent: from zero
             to a fifth of the finger's length.
         step: Largest change of a pull from one waypoint to the next [m].
+        drift: Largest motion that was not asked for [m], a turn counted at 20 mm from the centre.
         stiffness: Least eigenvalue of the grasp (`GraspSolution.smallest_eigenvalue`).
         waypoints: Largest number.
     """
@@ -80,6 +82,7 @@ class MoveLimits:
     least_tension: float = 0.0
     pulls: dict[str, np.ndarray] = field(default_factory=dict)
     step: float = 1e-4
+    drift: float = 0.006
     stiffness: float = 1e-3
     waypoints: int = 400
 
@@ -89,6 +92,7 @@ class MoveLimits:
         checks.real("largest_force", self.largest_force, above=self.least_force, unit="N")
         checks.real("least_tension", self.least_tension, low=0, unit="N")
         checks.real("step", self.step, above=0, high=0.01, unit="m")
+        checks.real("drift", self.drift, above=0, unit="m")
         checks.real("stiffness", self.stiffness, low=0, high=1)
         checks.integer("waypoints", self.waypoints, low=1, high=100000)
 
@@ -211,7 +215,7 @@ class _Planner:
         self.watch = watch
         self.start = solver.body.pose
         self.way = np.concatenate([target.shift, target.turn])
-        scaled = self.way * np.array([1.0] * 3 + [_ARM] * 3)
+        scaled = self.way * _SCALE
         self.along = scaled / np.linalg.norm(scaled)
 
     def run(self) -> MovePlan:
@@ -261,7 +265,7 @@ class _Planner:
             slopes = grasp_sensitivity(self.solver)
         except NotConverged as error:
             return str(error)
-        scale = np.diag([1.0] * 3 + [_ARM] * 3)
+        scale = np.diag(_SCALE)
         onward = np.outer(self.along, self.along) @ scale
         weights = np.concatenate([onward, _ASIDE * (scale - onward)]) / (_ARM * 0.02)
         rows = constraint_rows(solution, slopes, pulls, self.bounds)
@@ -295,20 +299,26 @@ class _Planner:
         for contact in found.contacts:
             if contact.status == "slip" or contact.margin < self.bounds.margin - 0.02:
                 return f"friction at disk {contact.disk} of {contact.finger}: it would slip"
+        scaled = self._moved(found) * _SCALE
+        aside = scaled - self.along * float(self.along @ scaled)
+        if float(np.linalg.norm(aside)) > self.limits.drift:
+            worst = int(np.argmax(np.abs(aside)))
+            kind = "shift along" if worst < 3 else "turn about"
+            return f"drift: the object would {kind} {'xyz'[worst % 3]}, which was not asked for"
         return ""
 
-    def _waypoint(self, solution: GraspSolution) -> Waypoint:
+    def _moved(self, solution: GraspSolution) -> np.ndarray:
         pose = solution.body.pose
-        moved = np.concatenate(
-            [pose.position - self.start.position, turn_between(self.start, pose)]
-        )
+        return np.concatenate([pose.position - self.start.position, turn_between(self.start, pose)])
+
+    def _waypoint(self, solution: GraspSolution) -> Waypoint:
+        moved = self._moved(solution)
         force = min((c.force for c in solution.contacts), default=0.0)
-        return Waypoint(self.solver.pulls, pose, solution.margin, force, moved)
+        return Waypoint(self.solver.pulls, solution.body.pose, solution.margin, force, moved)
 
     def _plan(self, waypoints: list[Waypoint], reached: bool, limiting: str) -> MovePlan:
-        scale = np.array([1.0] * 3 + [_ARM] * 3)
-        whole = float(self.along @ (scale * self.way))
-        share = float(self.along @ (scale * waypoints[-1].moved)) / whole
+        whole = float(self.along @ (_SCALE * self.way))
+        share = float(self.along @ (_SCALE * waypoints[-1].moved)) / whole
         return MovePlan(self.target, tuple(waypoints), reached, 1.0 if reached else share, limiting)
 
 
