@@ -220,6 +220,10 @@ def test_bad_values_are_named(fingers):
         solver.solve({"finger_9": [0.0]})
     with pytest.raises(InvalidValue, match=r"pulls\.finger_1\.main"):
         solver.solve({"finger_1": [0.3]})
+    with pytest.raises(InvalidValue, match=r"pulls\.finger_1\.main: nan"):
+        solver.solve({"finger_1": [float("nan")]})
+    with pytest.raises(InvalidValue, match=r"pulls\.finger_1: "):
+        solver.solve({"finger_1": [0.0, 0.0]})
     with pytest.raises(InvalidValue, match="force"):
         solver.solve({}, force=[0.0, float("nan"), 0.0])
     with pytest.raises(InvalidValue, match="overlaps the disk by"):

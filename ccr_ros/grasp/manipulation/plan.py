@@ -272,10 +272,10 @@ class _Planner:
         why = ""
         for _ in range(_SHRINKS):
             step = best_step(left, weights, 1.0, slopes, rows, size)
-            onwards = float(self.along @ (scale @ step.motion))
+            missing = float(self.along @ (scale @ left))  # negative: it went too far
+            onwards = float(self.along @ (scale @ step.motion)) * np.sign(missing)
             able = float(np.abs(self.along @ scale @ slopes.motion).sum()) * size
-            asked = min(float(self.along @ (scale @ left)), able)
-            if onwards < _LEAST * asked or asked <= 0:
+            if missing == 0 or onwards < _LEAST * min(abs(missing), able):
                 return why or "; ".join(step.limiting[:2]) or "no pull moves the object on"
             names = {m.finger.name: m.finger.cables for m in self.solver.hand.mounted}
             target, first = {}, 0

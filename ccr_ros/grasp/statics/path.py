@@ -25,6 +25,9 @@ _LARGEST_SHIFT = 0.05  # of the length, of the object in one Newton step
 # Of a support that fades out, against shifts and turns, in units of EI / L^3 and EI / L: well above
 # what holds an object between fingers. A dead load in its place would tip over what it stands on.
 _SUPPORT = 100.0
+_SINKING = 60  # steps that an object may sink
+_FAR = 0.2  # of the length, that it may
+_LOOSE = 0.1  # stiffness from which on an equilibrium without support is tried
 _LOAD_STEP = 0.1  # of the forces that press on the object, where there is friction
 
 
@@ -131,6 +134,36 @@ class Path:
             way.point, way.pulls, done = self._settled(way, found), pulls, share
             way.substeps += 1
             size *= 2.0
+
+    def sink(self, way: Way, target: list[np.ndarray], load: np.ndarray) -> None:
+        """Go on from where a support that went soft was not enough: the object sinks, damped.
+
+        Each step is one of implicit Euler on overdamped motion, a spring to where the object is:
+        it leaves an equilibrium that has ended for the next one downhill, if there is one near.
+        """
+        stiffness, first = 0.1 * _SUPPORT, way.point.pose
+        for _ in range(_SINKING):
+            far = float(np.linalg.norm(way.point.pose.position - first.position))
+            way.late = time.thread_time() > self._deadline
+            if way.late or far > _FAR * self.hand.length:
+                return
+            self._stood, self._stiffness = way.point.pose, stiffness
+            found = self._newton(way, self._sticking(way.point), target, load)
+            if found is None:
+                stiffness *= 4.0
+                if stiffness > _SUPPORT:
+                    return
+                continue
+            way.point, way.pulls = self._settled(way, found), target
+            way.substeps += 1
+            stiffness *= 0.5
+            if stiffness < _LOOSE:
+                self._stood, self._stiffness = None, 0.0
+                found = self._newton(way, way.point, target, load)
+                if found is not None:
+                    way.point, way.reached = self._settled(way, found), None
+                    return
+                stiffness *= 8.0
 
     def settled(self, point: GraspPoint) -> GraspPoint:
         """Return a point whose contacts are anchored where they are, without friction yet."""

@@ -28,8 +28,8 @@ class GraspSensitivity:
         motion: (6, M) of the object: translation [m/m] and rotation vector [rad/m], in the
             gripper's frame.
         normal: (k, M) of the contacts' normal forces [N/m].
-        along: (k, 3, M) of the friction forces on the fingers [N/m], in the gripper's frame, for
-            surfaces that keep their directions.
+        along: (k, 3, M) of the friction forces on the fingers [N/m], in the gripper's frame, but
+            for their turning with the object.
         tensions: (M, M) of the cables' tensions [N/m].
     """
 

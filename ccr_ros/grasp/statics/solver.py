@@ -147,7 +147,8 @@ class GraspSolver:
     def let_go(self) -> GraspSolution:
         """Take the object's support away, in steps: what it carried fades out.
 
-        Where the fingers cannot hold the object the solution has not converged and the support
+        Where that leaves no equilibrium near, the object sinks slowly to the next one. Where the
+        fingers cannot hold the object the solution has not converged and the support
         stays.
 
         Raises:
@@ -161,7 +162,10 @@ class GraspSolver:
             load = self._point.load
             carried = self._point.unbalanced + load
             way.point = gather(self.hand, self.body.pose, self._point.blocks, carried)
-            self._path(free=True).walk(way, self._pulls, load, stood=self.body.pose)
+            path = self._path(free=True)
+            path.walk(way, self._pulls, load, stood=self.body.pose)
+            if way.reached is not None and not way.late:
+                path.sink(way, self._pulls, load)
         if way.reached is None:
             self.supported = False
             self._accept(way.point, self._pulls)
@@ -226,7 +230,12 @@ class GraspSolver:
         target = []
         for index, mounted in enumerate(self.hand.mounted):
             finger, problem = mounted.finger, self.hand.problems[index]
-            wanted = finger.pulls_array(pulls.get(finger.name, self._pulls[index]))
+            try:
+                wanted = finger.pulls_array(pulls.get(finger.name, self._pulls[index]))
+            except InvalidValue as error:
+                place = error.place.removeprefix("pulls").lstrip(".")
+                where = ".".join(x for x in ("pulls", finger.name, place) if x)
+                raise InvalidValue(where, error.value, error.allowed) from None
             limits = problem.rest_lengths * finger.length
             for cable, pull, limit in zip(finger.cable_names, wanted, limits, strict=True):
                 if pull >= limit:
