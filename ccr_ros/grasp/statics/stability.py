@@ -19,7 +19,7 @@ from .assembly import FingerBlock, GraspPoint, Hand
 from .body import Body
 
 STABLE = 1e-6  # a grasp with a smaller eigenvalue is at a branch point, or past it
-_AUGMENT = (10.0, 1e3, 1e5)  # w, in turn, for gradients of unit length
+_AUGMENT = (1e3, 1e5)  # w, in turn, for gradients of unit length
 _AXES = "xyz"
 
 
