@@ -28,6 +28,8 @@ _SUPPORT = 100.0
 _SINKING = 60  # steps that an object may sink
 _FAR = 0.2  # of the length, that it may
 _LOOSE = 0.1  # stiffness from which on an equilibrium without support is tried
+_PATIENCE = 10  # Newton steps without a smaller error than any before, until that is given up
+_TORN = 2e-3  # share of a Newton step; one that would go as far twice has nothing to hold on to
 _LOAD_STEP = 0.1  # of the forces that press on the object, where there is friction
 
 
@@ -125,7 +127,7 @@ class Path:
             # What comes to touch has no friction in the step in which it does.
             skipped = found is not None and rough and size > 2 * fine and self._touches(found)
             if found is None or skipped:
-                size *= 0.5
+                size = 0.5 * (share - done)
                 way.late = time.thread_time() > self._deadline
                 if size < smallest or way.late:
                     way.reached = done
@@ -214,6 +216,7 @@ class Path:
             Bounds(p.length_bounds(u), np.zeros((len(p.obstacles), len(p.points.labels))))
             for p, u in zip(hand.problems, pulls, strict=True)
         ]
+        best, idle, torn = np.inf, 0, False
         for _ in range(self.settings.max_iterations):
             over = max(
                 violation(part.point, part.point.slacks(bound))
@@ -222,14 +225,31 @@ class Path:
             if at.residual <= tolerance and over <= tolerance:
                 pairs = zip(hand.problems, at.blocks, strict=True)
                 return None if any(meeting_disks(p, part.point) for p, part in pairs) else at
-            if time.thread_time() > self._deadline:
+            error = max(at.residual, over)
+            idle = 0 if error < best else idle + 1
+            best = min(best, error)
+            if idle > _PATIENCE or time.thread_time() > self._deadline:
                 return None
             step = newton_step(hand, at, bounds, self.free, self._stiffness)
             if step is None:
                 return None
             way.iterations += 1
-            at = self._moved(at, step, load)
+            share = self._share(step)
+            if torn and share < _TORN:
+                return None
+            torn = share < _TORN
+            at = self._moved(at, step, share, load)
         return None
+
+    def _share(self, step: Step) -> float:
+        """How much of a step is taken, in (0, 1]: none that turns or shifts anything too far."""
+        turn = max(
+            float(np.abs(part).max()) * problem.largest_scale
+            for part, problem in zip(step.fingers, self.hand.problems, strict=True)
+        )
+        turn = max(turn, float(np.linalg.norm(step.body[3:])))
+        shift = float(np.linalg.norm(step.body[:3]))
+        return min(1.0, _LARGEST_TURN / max(turn, 1e-12), _LARGEST_SHIFT / max(shift, 1e-12))
 
     def _yielding(self, load: np.ndarray, pose: Pose) -> np.ndarray:
         """The load less what a support that is going soft carries of it."""
@@ -239,15 +259,8 @@ class Path:
         turn = turn_between(self._stood, pose)
         return load - self._stiffness * np.concatenate([shift, turn])
 
-    def _moved(self, at: GraspPoint, step: Step, load: np.ndarray) -> GraspPoint:
+    def _moved(self, at: GraspPoint, step: Step, size: float, load: np.ndarray) -> GraspPoint:
         hand = self.hand
-        turn = max(
-            float(np.abs(part).max()) * problem.largest_scale
-            for part, problem in zip(step.fingers, hand.problems, strict=True)
-        )
-        turn = max(turn, float(np.linalg.norm(step.body[3:])))
-        shift = float(np.linalg.norm(step.body[:3]))
-        size = min(1.0, _LARGEST_TURN / max(turn, 1e-12), _LARGEST_SHIFT / max(shift, 1e-12))
         pose = displaced(at.pose, size * step.body, hand.length) if self.free else at.pose
         parts = []
         for index, part in enumerate(at.blocks):
