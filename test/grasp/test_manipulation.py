@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from friction_cases import LONG
 
+from ccr_ros.grasp.clearance import disk_clearance
 from ccr_ros.grasp.manipulation import MoveLimits, MoveTarget, plan_move
 from ccr_ros.grasp.manipulation.step import StepLimits, best_step, constraint_rows
 from ccr_ros.grasp.statics import Body, GraspSolver
@@ -115,6 +116,21 @@ def test_what_cannot_be_reached_names_what_limits_it(solver):
     assert "stability" in stiff.limiting or not stiff.reached
     drifted = plan_move(solver, far, MoveLimits(drift=5e-4))
     assert drifted.share < slipping.share and "not asked for" in drifted.limiting
+
+
+def test_fingers_that_would_meet_limit_a_plan(solver, monkeypatch):
+    """The second time that it is looked at two disks touch, as they do nowhere in this grasp."""
+    gaps = iter([0.005, 0.001, 0.0])
+
+    def clearance(fingers, bases):
+        found = disk_clearance(fingers, bases)
+        assert found.gap > 0.005 and len(bases) == 3
+        return replace(found, gap=next(gaps, 0.0))
+
+    monkeypatch.setattr("ccr_ros.grasp.manipulation.plan.disk_clearance", clearance)
+    plan = plan_move(solver, MoveTarget(turn=np.array([0.0, 0.0, 0.3])))
+    assert not plan.reached and len(plan.waypoints) == 2
+    assert plan.limiting.startswith("room: disk") and "meet" in plan.limiting
 
 
 def test_a_watch_may_end_it(solver):

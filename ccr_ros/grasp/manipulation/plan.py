@@ -9,118 +9,25 @@ does not follow within the limits is not planned; what stopped it is named.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
+from ccr_ros.grasp.clearance import disk_clearance
 from ccr_ros.grasp.statics import GraspSolution, GraspSolver
 from ccr_ros.grasp.statics.path import turn_between
 from ccr_ros.grasp.statics.sensitivity import grasp_sensitivity
-from ccr_ros.model import checks
-from ccr_ros.model.errors import InvalidValue, NotConverged, UnknownName
+from ccr_ros.model.errors import InvalidValue, NotConverged
 from ccr_ros.model.rotation import Pose
 
 from .step import StepLimits, best_step, constraint_rows
+from .target import MoveLimits, MoveTarget
 
 _ARM = 0.02  # m; as far from its centre a turn counts as much as a shift
 _SCALE = np.array([1.0] * 3 + [_ARM] * 3)
 _ASIDE = 0.4  # weight of motions that were not asked for
 _LEAST = 0.02  # share of a step's wanted motion below which nothing gets on any more
 _SHRINKS = 5  # times that a step is halved before it is given up
-
-
-@dataclass(frozen=True)
-class MoveTarget:
-    """Where a held object is to go, from where it is.
-
-    Attributes:
-        shift: (3,) [m] of its centre, in the gripper's frame.
-        turn: (3,) [rad] rotation vector about its centre, in the gripper's frame.
-        shift_tolerance: [m]; turn_tolerance: [rad].
-
-    Raises:
-        InvalidValue: Nothing is asked for, or a value is out of range.
-    """
-
-    shift: np.ndarray = field(default_factory=lambda: np.zeros(3))
-    turn: np.ndarray = field(default_factory=lambda: np.zeros(3))
-    shift_tolerance: float = 1e-4
-    turn_tolerance: float = np.deg2rad(0.2)
-
-    def __post_init__(self) -> None:
-        shift = checks.vector("shift", self.shift, 3, unit="m", largest=1.0)
-        turn = checks.vector("turn", self.turn, 3, unit="rad", largest=np.pi)
-        if float(np.linalg.norm(turn)) > np.pi:
-            raise InvalidValue("turn", turn.tolist(), "a rotation vector of at most pi [rad]")
-        object.__setattr__(self, "shift", shift)
-        object.__setattr__(self, "turn", turn)
-        checks.real("shift_tolerance", self.shift_tolerance, above=0, high=0.1, unit="m")
-        checks.real("turn_tolerance", self.turn_tolerance, above=0, high=1.0, unit="rad")
-        if not (np.any(shift) or np.any(turn)):
-            raise InvalidValue("target", [0.0] * 6, "a shift or a turn that is not zero")
-
-
-@dataclass(frozen=True, eq=False)
-class MoveLimits:
-    """What a plan keeps.
-
-    Attributes:
-        margin: Least friction margin of each contact, in [0, 1).
-        least_force: Of each contact [N]; largest_force: [N].
-        least_tension: Of each cable [N].
-        pulls: Lowest and highest pull (m, 2) [m] by finger, one row per cable; absent: from zero
-            to a fifth of the finger's length.
-        step: Largest change of a pull from one waypoint to the next [m].
-        drift: Largest motion that was not asked for [m], a turn counted at 20 mm from the centre.
-        stiffness: Least eigenvalue of the grasp (`GraspSolution.smallest_eigenvalue`).
-        waypoints: Largest number.
-    """
-
-    margin: float = 0.1
-    least_force: float = 0.005
-    largest_force: float = 5.0
-    least_tension: float = 0.0
-    pulls: dict[str, np.ndarray] = field(default_factory=dict)
-    step: float = 1e-4
-    drift: float = 0.006
-    stiffness: float = 1e-3
-    waypoints: int = 400
-
-    def __post_init__(self) -> None:
-        checks.real("margin", self.margin, low=0, below=1)
-        checks.real("least_force", self.least_force, low=0, unit="N")
-        checks.real("largest_force", self.largest_force, above=self.least_force, unit="N")
-        checks.real("least_tension", self.least_tension, low=0, unit="N")
-        checks.real("step", self.step, above=0, high=0.01, unit="m")
-        checks.real("drift", self.drift, above=0, unit="m")
-        checks.real("stiffness", self.stiffness, low=0, high=1)
-        checks.integer("waypoints", self.waypoints, low=1, high=100000)
-
-    def for_solver(self, solver: GraspSolver) -> StepLimits:
-        """Return these limits in the order of a solver's cables.
-
-        Raises:
-            UnknownName, InvalidValue: Pull limits of no finger, or not of its cables.
-        """
-        for name in self.pulls:
-            if name not in solver.names:
-                raise UnknownName("finger", name, solver.names)
-        low, high = [], []
-        for mounted in solver.hand.mounted:
-            finger, count = mounted.finger, len(mounted.finger.cables)
-            default = np.tile([0.0, 0.2 * finger.length], (count, 1))
-            given = np.asarray(self.pulls.get(finger.name, default), dtype=float)
-            place = f"limits.pulls.{finger.name}"
-            if given.shape != (count, 2) or not np.isfinite(given).all():
-                raise InvalidValue(place, given.tolist(), f"{count} pairs of finite pulls [m]")
-            if (given[:, 0] > given[:, 1]).any():
-                raise InvalidValue(place, given.tolist(), "pairs, the lower pull first")
-            low.append(given[:, 0])
-            high.append(given[:, 1])
-        return StepLimits(
-            self.margin, self.least_force, self.largest_force, self.least_tension,
-            np.concatenate(low), np.concatenate(high), self.step,
-        )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,6 +121,8 @@ class _Planner:
         self.bounds = bounds
         self.watch = watch
         self.start = solver.body.pose
+        self.bases = [mounted.base for mounted in solver.hand.mounted]
+        self.crowded = False  # fingers meet already, which no step can be blamed for
         self.way = np.concatenate([target.shift, target.turn])
         scaled = self.way * _SCALE
         self.along = scaled / np.linalg.norm(scaled)
@@ -221,6 +130,7 @@ class _Planner:
     def run(self) -> MovePlan:
         solution = self.solver.solve({}).require_converged()
         first = self._waypoint(solution)
+        self.crowded = disk_clearance(solution.fingers, self.bases).touching
         # A grasp that is weaker than the limits may be moved, and not get weaker.
         self.bounds = StepLimits(
             **{
@@ -269,10 +179,15 @@ class _Planner:
         onward = np.outer(self.along, self.along) @ scale
         weights = np.concatenate([onward, _ASIDE * (scale - onward)]) / (_ARM * 0.02)
         rows = constraint_rows(solution, slopes, pulls, self.bounds)
+        missing = float(self.along @ (scale @ left))  # negative: it went too far
+        wanted = self.along * missing
+        aside = scale @ left - wanted
+        # What has gone aside comes back no faster than the object goes on, lest it go back instead.
+        far = float(np.linalg.norm(aside))
+        wanted = (wanted + aside * min(1.0, abs(missing) / max(far, 1e-12))) / _SCALE
         why = ""
         for _ in range(_SHRINKS):
-            step = best_step(left, weights, 1.0, slopes, rows, size)
-            missing = float(self.along @ (scale @ left))  # negative: it went too far
+            step = best_step(wanted, weights, 1.0, slopes, rows, size)
             onwards = float(self.along @ (scale @ step.motion)) * np.sign(missing)
             able = float(np.abs(self.along @ scale @ slopes.motion).sum()) * size
             if missing == 0 or onwards < _LEAST * min(abs(missing), able):
@@ -305,6 +220,9 @@ class _Planner:
             worst = int(np.argmax(np.abs(aside)))
             kind = "shift along" if worst < 3 else "turn about"
             return f"drift: the object would {kind} {'xyz'[worst % 3]}, which was not asked for"
+        near = disk_clearance(found.fingers, self.bases)
+        if near.touching and not self.crowded:
+            return f"room: {near.in_words()}"
         return ""
 
     def _moved(self, solution: GraspSolution) -> np.ndarray:
