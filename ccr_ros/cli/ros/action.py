@@ -99,7 +99,7 @@ def run_type(args: argparse.Namespace) -> None:
 def _types_of(node: Any, name: str) -> list[str]:
     from rclpy.action import get_action_names_and_types
 
-    return types_of("action", name, visible(get_action_names_and_types(node), True))
+    return types_of(node, "action", name, lambda: get_action_names_and_types(node))
 
 
 def run_info(args: argparse.Namespace) -> None:

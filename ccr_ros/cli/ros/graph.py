@@ -18,9 +18,14 @@ NODE_PREFIX = "_ccr_cli"
 EXIT_TERMINATED = 143  # 128 + SIGTERM, as shells report it
 
 # The graph counts as known once so many looks, _STEP seconds apart, have shown nothing new: looks
-# and not seconds, as on a busy machine others answer late, and the looks are late as well. Fast DDS
-# finds the graph in steps that may be further apart.
-_LOOKS, _LOOKS_FAST_DDS, _LIMIT, _STEP = 10, 30, 10.0, 0.05
+# and not seconds, as on a busy machine others answer late, and the looks are late as well.
+_LOOKS, _LIMIT, _STEP = 10, 10.0, 0.05
+
+# With Fast DDS a new process sees a running one either at once or some seconds later, when what was
+# lost of the first exchange is sent again. `ros2` hides that behind its daemon, which stays. Here
+# the graph has to be quiet for longer; and while nothing is seen, or not what was asked for, it is
+# looked for up to so many looks.
+_LOOKS_FAST_DDS, _LOOKS_IN_VAIN_FAST_DDS = 30, 80
 
 NamesAndTypes = list[tuple[str, list[str]]]
 
@@ -100,12 +105,26 @@ def spin_until(node: Any, done: Callable[[], bool], limit: float | None = None) 
     return True
 
 
-def _settle(node: Any) -> None:
-    """Wait until what is known of the graph does not change any more."""
+def _on_fast_dds() -> bool:
     from rclpy.utilities import get_rmw_implementation_identifier
 
-    fast_dds = "fastrtps" in get_rmw_implementation_identifier()
-    wanted = _LOOKS_FAST_DDS if fast_dds else _LOOKS
+    return "fastrtps" in get_rmw_implementation_identifier()
+
+
+def spin_until_seen(node: Any, seen: Callable[[], bool], limit: float = 0.0) -> bool:
+    """Run the node until something of others is seen, and tell whether it is.
+
+    It is waited for as long as the middleware may need for it if that is more than the limit [s].
+    """
+    if _on_fast_dds():
+        limit = max(limit, _LOOKS_IN_VAIN_FAST_DDS * _STEP)
+    return spin_until(node, seen, limit)
+
+
+def _settle(node: Any) -> None:
+    """Wait until what is known of the graph does not change any more."""
+    fast_dds = _on_fast_dds()
+    own = len(node.get_node_names())
     seen: Any = None
     looks = 0
 
@@ -118,7 +137,9 @@ def _settle(node: Any) -> None:
         )
         looks = looks + 1 if now == seen else 0
         seen = now
-        return looks >= wanted
+        if not fast_dds:
+            return looks >= _LOOKS
+        return looks >= (_LOOKS_FAST_DDS if len(now[0]) > own else _LOOKS_IN_VAIN_FAST_DDS)
 
     spin_until(node, quiet, _LIMIT)
 
@@ -172,7 +193,7 @@ def find_node(node: Any, name: str, timeout: float = 0.0) -> str:
         CcrError: there is none within the timeout.
     """
     full = "/" + name.lstrip("/")
-    if not spin_until(node, lambda: full in node_names(node, include_hidden=True), timeout):
+    if not spin_until_seen(node, lambda: full in node_names(node, include_hidden=True), timeout):
         raise unknown("node", full, node_names(node))
     return full
 
@@ -183,16 +204,21 @@ def split_node_name(full: str) -> tuple[str, str]:
     return name, namespace or "/"
 
 
-def types_of(kind: str, name: str, pairs: NamesAndTypes) -> list[str]:
-    """Return the types that a name has in a list of names and types.
+def types_of(node: Any, kind: str, name: str, pairs: Callable[[], NamesAndTypes]) -> list[str]:
+    """Return the types that a topic, service or action has.
+
+    Args:
+        node: The node that looks.
+        kind: What is named, as ``topic``.
+        name: Its full name.
+        pairs: Gives the names and types in the graph.
 
     Raises:
-        CcrError: the name is not in the list.
+        CcrError: the name is not in the graph.
     """
-    found = dict(pairs)
-    if name not in found:
-        raise unknown(kind, name, found)
-    return found[name]
+    if not spin_until_seen(node, lambda: name in dict(pairs())):
+        raise unknown(kind, name, dict(pairs()))
+    return sorted(dict(pairs())[name])
 
 
 def wait_for_type(
@@ -226,7 +252,7 @@ def wait_for_type(
         if notice:
             print(notice)
         spin_until(node, there, timeout)
-    types = types_of(kind, name, visible(pairs(), True))
+    types = types_of(node, kind, name, pairs)
     if type_name not in types:
         raise CcrError(f"{kind} {name!r} is of type {', '.join(types)}, not {type_name}")
 

@@ -13,7 +13,14 @@ import argparse
 import sys
 from typing import Any
 
-from ccr_ros.cli.ros.graph import find_node, graph_node, node_names, spin_until, unknown
+from ccr_ros.cli.ros.graph import (
+    find_node,
+    graph_node,
+    node_names,
+    spin_until,
+    spin_until_seen,
+    unknown,
+)
 from ccr_ros.cli.ros.verbs import Verbs
 from ccr_ros.cli.ros.verbs import run_verb as run
 from ccr_ros.model.errors import CcrError
@@ -57,7 +64,7 @@ def _lifecycle_nodes(node: Any, include_hidden: bool) -> list[str]:
 
 def _find(node: Any, name: str) -> str:
     full = find_node(node, name)
-    if full not in _lifecycle_nodes(node, include_hidden=True):
+    if not spin_until_seen(node, lambda: full in _lifecycle_nodes(node, include_hidden=True)):
         raise unknown("lifecycle node", full, _lifecycle_nodes(node, include_hidden=False))
     return full
 

@@ -89,7 +89,7 @@ def run_type(args: argparse.Namespace) -> None:
 
 
 def _types_of(node: Any, name: str) -> list[str]:
-    return types_of("service", name, visible(node.get_service_names_and_types(), True))
+    return types_of(node, "service", name, node.get_service_names_and_types)
 
 
 def run_info(args: argparse.Namespace) -> None:

@@ -72,7 +72,7 @@ def run_info(args: argparse.Namespace) -> None:
     """Print type, publishers and subscriptions of a topic."""
     with graph_node(args) as node:
         name = full_name(node, args.topic_name)
-        types = types_of("topic", name, visible(node.get_topic_names_and_types(), True))
+        types = types_of(node, "topic", name, node.get_topic_names_and_types)
         end = "\n\n" if args.verbose else "\n"
         print(f"Type: {types[0] if len(types) == 1 else types}", end=end)
         for what, infos in (
@@ -88,7 +88,7 @@ def run_type(args: argparse.Namespace) -> None:
     """Print the types of a topic."""
     with graph_node(args) as node:
         name = full_name(node, args.topic_name)
-        print(*types_of("topic", name, visible(node.get_topic_names_and_types(), True)), sep="\n")
+        print(*types_of(node, "topic", name, node.get_topic_names_and_types), sep="\n")
 
 
 def run_find(args: argparse.Namespace) -> None:

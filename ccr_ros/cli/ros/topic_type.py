@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
-from ccr_ros.cli.ros.graph import near, spin_until, unknown
+from ccr_ros.cli.ros.graph import near, spin_until, spin_until_seen, unknown
 from ccr_ros.cli.ros.types import message_type
 from ccr_ros.model.errors import CcrError
 
@@ -27,10 +27,10 @@ def type_from_graph(node: Any, topic: str, limit: float | None) -> Any:
     def topics() -> dict[str, list[str]]:
         return dict(node.get_topic_names_and_types())
 
-    known = topics()
-    if topic not in known:
+    if not spin_until_seen(node, lambda: topic in topics()):
+        known = near(topic, topics())
         print(
-            f"WARNING: topic [{topic}] does not appear to be published yet{near(topic, known)}",
+            f"WARNING: topic [{topic}] does not appear to be published yet{known}",
             file=sys.stderr,
         )
         if not spin_until(node, lambda: topic in topics(), limit):
