@@ -156,7 +156,11 @@ def test_a_node_runs_alone_and_ends_well(environment):
     [
         ("embedded", "not internal"),
         # What is said and heard; what fingers do does not depend on what carries it.
-        ("nodes", "test_solver_node or test_servo_lifecycle or test_grasp_hold_and_timed_release"),
+        (
+            "nodes",
+            "test_solver_node or test_solver_process or test_servo_lifecycle"
+            " or test_grasp_hold_and_timed_release",
+        ),
         ("ros_cli", "test_cli_node_service or test_cli_param or test_cli_topic_pub"),
     ],
 )

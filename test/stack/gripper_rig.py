@@ -23,7 +23,7 @@ from ccr_ros.stack.processes import Children
 from ccr_ros.stack.up import NODES, arguments_for, node_part
 
 FINGERS = ("finger_1", "finger_2", "finger_3")
-LIMIT = 60.0  # s; far beyond what anything takes
+LIMIT = 120.0  # s; far beyond what anything takes
 
 
 class Rig:
@@ -68,6 +68,7 @@ class Rig:
             own = {
                 "calibration_file": str(self._folder / "zeros.yaml"),
                 "loopback.state_file": str(self._folder / "angles.yaml"),
+                "rate": 20.0,  # each of its cycles is three poses to solve
             }
         elif name == "gripper_coordinator_node" and self._patience:
             timeouts = ("solver_timeout", "bridge_timeout", "stale_timeout")
@@ -138,7 +139,7 @@ class Rig:
 
     def grasp(self, force=0.3):
         succeeded, result = self.act(
-            self.grasp_client, Grasp.Goal(object="ball", force=force, timeout=50.0)
+            self.grasp_client, Grasp.Goal(object="ball", force=force, timeout=LIMIT)
         )
         assert succeeded and result.reached, result.message
         return result
