@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from fnmatch import fnmatchcase
 from importlib.metadata import version
 
+from .grasping import grasps, measure_grasp
 from .measure import OWN, Row, measure, set_error
 from .memory import measure_memory
 from .routing import measure_search, searches
@@ -41,8 +42,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(table(rows))
         print(f"\n{len(rows)} rows in {seconds:.0f} s; {_machine()}")
     # Not the group "cable-model": with given spans a finger may have no pose clear of an obstacle.
-    groups = ("sweep", "pulls", "rest-shape", "routing")
-    ours = (r for r in rows if r.group == "discretisation" or (r.group in groups and r.name == OWN))
+    groups = ("sweep", "pulls", "rest-shape", "routing", "grasp")
+    ours = (
+        r
+        for r in rows
+        if r.group == "discretisation" or (r.group in groups and r.name.startswith(OWN))
+    )
     return int(any(row.converged < row.samples for row in ours))
 
 
@@ -70,7 +75,8 @@ def run(quick: bool, pattern: str = "*") -> list[Row]:
     sent = [row for plan in connections(quick) if wanted((row := plan.row()).id)]
     tracked = [row for plan in tracks(quick) if wanted((row := plan.row()).id)]
     searched = [row for plan in searches(quick) if wanted((row := plan.row()).id)]
-    total = len(timed) + len(memory) + len(sent) + len(tracked) + len(searched)
+    held = [row for plan in grasps(quick) if wanted((row := plan.row()).id)]
+    total = sum(map(len, (timed, memory, sent, tracked, searched, held)))
     rows: list[Row] = []
     for plan in timed:
         _progress(len(rows), total, plan.id)
@@ -88,6 +94,10 @@ def run(quick: bool, pattern: str = "*") -> list[Row]:
     for row in searched:
         _progress(len(rows), total, row.id)
         measure_search(row, quick)
+        rows.append(row)
+    for row in held:
+        _progress(len(rows), total, row.id)
+        measure_grasp(row, quick)
         rows.append(row)
     for row in sent:
         _progress(len(rows), total, row.id)

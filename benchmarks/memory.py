@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from .cases import load_case
+from .grasping import ball_maker, ball_path
 from .suites import OWN, cartesian, own
 
 STEPS = 5
@@ -47,6 +48,14 @@ def measure_memory(method: str, case: str, n: int) -> float:
 
 def main(method: str, name: str, n: int) -> None:
     """Measure in this process and print the megabytes."""
+    if name == "ball":
+        path, make = ball_path(STEPS), ball_maker(method)
+        before = memory_megabytes(peak=False)
+        solve = make()
+        for pulls in path:
+            solve(pulls)
+        print(memory_megabytes(peak=True) - before)
+        return
     case = load_case(name, n)
     before = memory_megabytes(peak=False)
     sweeper = own(case)() if method == OWN else cartesian(case, method)()

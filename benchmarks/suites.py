@@ -33,6 +33,7 @@ GROUPS: dict[str, str] = {
     "pulls": "Pulls that follow a path of the tip (200 points; 25 if quick)",
     "rest-shape": "Rest shapes for a wanted shape (errors: of the forward model, from rest)",
     "routing": "Routings for disk centres, found among 12 holes a disk",
+    "grasp": "Fingers and the object they hold, solved together along a stream of pulls",
     "memory": "Peak resident memory of build and five steps, above the imported libraries",
     "transport": "Messages between two processes, and a node that idles",
 }
@@ -70,9 +71,10 @@ def plans(quick: bool) -> Iterator[Plan]:
 def memory_plans(quick: bool) -> list[tuple[str, str, int]]:
     """Return (method, case, n) of every memory row."""
     if quick:
-        return [(method, "straight", 9) for method in (OWN, "ipopt")]
+        return [(method, name, 9) for name in ("straight", "ball") for method in (OWN, "ipopt")]
     small = [(method, "straight", 9) for method in (OWN, *BASELINES)]
-    return small + [(method, "straight", 90) for method in (OWN, "ipopt")]
+    large = [("straight", 90), ("ball", 9)]  # the ball: in the hold of three fingers
+    return small + [(method, name, n) for name, n in large for method in (OWN, "ipopt")]
 
 
 def own(case: Case, settings: SolverSettings | None = None) -> Callable[[], Sweeper]:

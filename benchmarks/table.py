@@ -56,7 +56,8 @@ SENT: tuple[Column, ...] = (
     ("cpu ratio", lambda r: _times(r.cpu_ratio)),
     ("note", lambda r: r.note),
 )
-COLUMNS = {"memory": MEMORY, "transport": SENT}
+HELD = tuple(column for column in TIMED if not column[0].startswith("RMS"))
+COLUMNS = {"memory": MEMORY, "transport": SENT, "grasp": HELD}
 TEXT = {"solver", "carrier", "note"}  # left-aligned
 
 
@@ -81,6 +82,7 @@ def table(rows: Sequence[Row]) -> str:
         "model against the wanted disks.\n"
         "routing: a step is a whole search, iter. how many poses are tried by the forward solver;\n"
         "found: every disk within 0.1 mm of the wanted centre.\n"
+        "grasp: the rows of ball with friction are compared with IPOPT without; iter. of Newton.\n"
         "transport: p50, p99 from publish to callback, or of calling a service until its answer;\n"
         "cpu of both processes for one of them, or of an idle node in a second."
     )

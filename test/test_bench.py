@@ -210,7 +210,7 @@ def test_full_plan_covers_what_is_promised():
         for n in (9, 30, 90):
             assert {f"sweep/{name}/n{n}/ccr_ros", f"sweep/{name}/n{n}/ipopt"} <= ids
         assert {f"sweep/{name}/n9/trust-constr", f"sweep/{name}/n9/slsqp"} <= ids
-    others = {"memory", "transport", "pulls", "routing"}
+    others = {"memory", "transport", "pulls", "routing", "grasp"}
     assert {plan.group for plan in plans(quick=False)} | others == set(GROUPS)
     assert len(ids) == len(list(plans(quick=False)))
     assert len(set(memory_plans(quick=False))) == len(memory_plans(quick=False))
@@ -246,7 +246,7 @@ def test_quick_bench_end_to_end():
         elif row.group == "transport":
             assert row.p99_ms >= row.p50_ms > 0
             assert row.cpu_ms > 0
-        elif row.group == "pulls":
+        elif row.group in ("pulls", "grasp"):
             assert row.steps == row.converged == row.steps_wanted
             assert row.p99_ms >= row.p50_ms > 0
         elif row.group == "routing":
