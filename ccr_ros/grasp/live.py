@@ -45,6 +45,8 @@ class LiveGrasp:
     ) -> None:
         start = body if at is None else replace(body, pose=at)
         self._solver = GraspSolver(fingers, start, settings, gravity)
+        self._arguments = fingers, start, settings, gravity
+        self._copy: GraspSolver | None = None
         self._said = body.pose
         self._mass = body.mass
         self._wanted = False  # whether it shall be held
@@ -70,6 +72,21 @@ class LiveGrasp:
     def held(self) -> bool:
         """Whether the fingers carry it."""
         return not self._solver.supported and not self.failure
+
+    def copy(self, time_limit: float) -> GraspSolver:
+        """Return a solver that stands where this grasp does, to plan on while this one goes on.
+
+        It is the same one every time, so that only one may plan at a time.
+
+        Args:
+            time_limit: Longest CPU time of one of its solves [s].
+        """
+        if self._copy is None:
+            fingers, body, settings, gravity = self._arguments
+            settings = replace(settings, time_limit=min(settings.time_limit, time_limit))
+            self._copy = GraspSolver(fingers, body, settings, gravity)
+        self._copy.resume(self._solver.standing)
+        return self._copy
 
     def place(self, pose: Pose, held: bool) -> Pose:
         """Return where the object is once this is said of it.

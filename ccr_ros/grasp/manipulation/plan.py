@@ -8,7 +8,7 @@ does not follow within the limits is not planned; what stopped it is named.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
 
 import numpy as np
@@ -95,13 +95,37 @@ def plan_move(
         InvalidValue: Nothing is held, the object is supported, or limits are not of this gripper.
         NotConverged: The present grasp is no equilibrium any more.
     """
+    steps = move_steps(solver, target, limits)
+    try:
+        found = next(steps)
+        while True:
+            ends = found is not None and watch is not None and not watch(found)
+            found = steps.send("stopped by the caller" if ends else "")
+    except StopIteration as end:
+        plan: MovePlan = end.value
+        return plan
+    finally:
+        steps.close()
+
+
+def move_steps(
+    solver: GraspSolver, target: MoveTarget, limits: MoveLimits | None = None
+) -> Generator[Waypoint | None, str | None, MovePlan]:
+    """Plan as `plan_move` does, a solve at a time, for who has other things to do between.
+
+    Yields each new waypoint, or None after a try that gave none. What is sent back, if not empty,
+    is why the plan shall end there. The solver is for the plan alone until it is over.
+
+    Raises:
+        InvalidValue, NotConverged: As for `plan_move`.
+    """
     limits = MoveLimits() if limits is None else limits
     bounds = limits.for_solver(solver)
     if solver.supported or solver.point is None:
         raise InvalidValue("grasp", "supported", "an object that the fingers alone hold (let_go)")
     before = solver.standing
     try:
-        return _Planner(solver, target, limits, bounds, watch).run()
+        return (yield from _Planner(solver, target, limits, bounds).steps())
     finally:
         solver.resume(before)
 
@@ -113,13 +137,11 @@ class _Planner:
         target: MoveTarget,
         limits: MoveLimits,
         bounds: StepLimits,
-        watch: Callable[[Waypoint], bool] | None,
     ) -> None:
         self.solver = solver
         self.target = target
         self.limits = limits
         self.bounds = bounds
-        self.watch = watch
         self.start = solver.body.pose
         self.bases = [mounted.base for mounted in solver.hand.mounted]
         self.crowded = False  # fingers meet already, which no step can be blamed for
@@ -127,7 +149,7 @@ class _Planner:
         scaled = self.way * _SCALE
         self.along = scaled / np.linalg.norm(scaled)
 
-    def run(self) -> MovePlan:
+    def steps(self) -> Generator[Waypoint | None, str | None, MovePlan]:
         solution = self.solver.solve({}).require_converged()
         first = self._waypoint(solution)
         self.crowded = disk_clearance(solution.fingers, self.bases).touching
@@ -144,15 +166,15 @@ class _Planner:
             left = self.way - waypoints[-1].moved
             if self._there(left):
                 return self._plan(waypoints, True, "")
-            found = self._step(solution, left, size)
+            found = yield from self._step(solution, left, size)
             if isinstance(found, str):
                 limiting = found
                 break
             solution, size = found
             waypoints.append(self._waypoint(solution))
             size = min(self.limits.step, 2 * size)
-            if self.watch is not None and not self.watch(waypoints[-1]):
-                limiting = "stopped by the caller"
+            limiting = (yield waypoints[-1]) or ""
+            if limiting:
                 break
         else:
             limiting = f"the number of waypoints: {self.limits.waypoints} at most"
@@ -167,7 +189,7 @@ class _Planner:
 
     def _step(
         self, solution: GraspSolution, left: np.ndarray, size: float
-    ) -> tuple[GraspSolution, float] | str:
+    ) -> Generator[None, str | None, tuple[GraspSolution, float] | str]:
         """The next solution and the step's size, or why there is none."""
         before = self.solver.standing
         pulls = np.concatenate(list(self.solver.pulls.values()))
@@ -203,6 +225,8 @@ class _Planner:
                 return found, size
             self.solver.resume(before)
             size *= 0.5
+            if ended := (yield None):
+                return ended
         return why
 
     def _refusal(self, found: GraspSolution) -> str:

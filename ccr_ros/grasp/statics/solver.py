@@ -220,6 +220,10 @@ class GraspSolver:
         self.body, self.supported = standing.body, standing.supported
         self._outer, self._point = standing.outer, standing.point
         self._pulls = list(standing.pulls)
+        # A solver that has met no object yet has none among its problems' obstacles.
+        for index, mounted in enumerate(self.hand.mounted):
+            here = self.body.shape.moved(self.hand.in_base(index, self.body.pose))
+            self.hand.problems[index].obstacles = (*mounted.finger.obstacles, here)
 
     # -- inside ----------------------------------------------------------------------------
 
