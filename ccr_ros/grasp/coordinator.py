@@ -6,25 +6,32 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from ccr_ros.model.errors import CcrError
+
 from .closing import Closing, Verdict
 from .finger_control import FingerControl
-from .grip import Grip
-from .machine import Event, GripperMachine, State
-from .opening import Opening, is_open
+from .gripper_base import GripperBase
+from .machine import Event, State
+from .margin_keeper import MarginKeeper
+from .move_path import MovePath
+from .moves import MoveGoal, MoveRun
+from .moving import Moving
+from .opening import Opening
 from .progress import Lasting
-from .runs import End, GraspGoal, Outcome, Refused, ReleaseGoal, Run
+from .runs import End, GraspGoal, Outcome, ReleaseGoal, Run
 from .settings import GraspSettings
-from .watch import ServoHealth, bridge_trouble, solver_trouble
+from .watch import bridge_trouble, solver_trouble
 
+_FEELING = (State.CLOSING, State.HOLDING, State.MOVING)  # what is touched must be known
 _LONGEST_STEP = 0.1  # s; a step that comes late moves no farther than this allows
-_MOVING = (State.OPENING, State.CLOSING, State.RELEASING)
 
 
-class GripperCoordinator:
-    """Grasps, holds and lets go.
+class GripperCoordinator(GripperBase):
+    """Grasps, holds, moves what is held, and lets go.
 
-    What is heard goes into ``fingers`` and ``servos``; `step` is called at a steady rate and moves
-    the commands, which are `FingerControl.command`. Times are seconds of one steady clock.
+    What is heard goes into ``fingers``, ``servos`` and ``thing``; `step` is called at a steady
+    rate and moves the commands, which are `FingerControl.command`. Times are seconds of one steady
+    clock.
 
     Args:
         fingers: The gripper's fingers.
@@ -32,64 +39,11 @@ class GripperCoordinator:
     """
 
     def __init__(self, fingers: Sequence[FingerControl], settings: GraspSettings) -> None:
-        self.fingers = {finger.name: finger for finger in fingers}
-        self.settings = settings
-        self.servos = ServoHealth()
-        self.grip = Grip(self.fingers, settings)
-        self.message = "where the fingers are is not known yet"
-        self.refusal = ""
-        self._machine = GripperMachine()
-        self._closing: Closing | None = None
-        self._grasp: Run[GraspGoal] | None = None  # under way
-        self._release: Run[ReleaseGoal] | None = None  # waiting for its time, or under way
+        super().__init__(fingers, settings)
+        self._keeper = MarginKeeper(self.grip, self.thing, settings)
         self._opening: Opening | None = None
         self._pressed = Lasting()
-        self._adopted = False
         self._stepped_at: float | None = None
-
-    # What may be seen
-
-    @property
-    def state(self) -> State:
-        """What the gripper does."""
-        return self._machine.now
-
-    @property
-    def phase(self) -> str:
-        """``approach`` or ``press`` while closing, else empty."""
-        return self._closing.phase if self._closing and self.state is State.CLOSING else ""
-
-    @property
-    def commanding(self) -> bool:
-        """Whether commands must go out."""
-        return self.state in (*_MOVING, State.HOLDING)
-
-    @property
-    def object_held(self) -> bool:
-        """Whether all required fingers touch, with their efforts agreeing, once gripped."""
-        return self.grip.committed and self.grip.complete
-
-    def target(self, finger: FingerControl) -> float:
-        """Force that a finger is regulated to [N]; 0: it is not."""
-        if self.state is State.HOLDING:
-            return self.grip.targets.get(finger.name, 0.0)
-        if self._closing is not None and self.state is State.CLOSING and self.grip.touches(finger):
-            return self._closing.target
-        return 0.0
-
-    @property
-    def target_force(self) -> float:
-        """Target of the grasp that is under way or holds [N]; 0: none."""
-        if self._grasp is not None:
-            return self._grasp.goal.force
-        return max(self.grip.targets.values(), default=0.0) if self.state is State.HOLDING else 0.0
-
-    def release_in(self, now: float) -> float:
-        """Return the time until a waiting release begins [s]; negative: none waits."""
-        run = self._release
-        if run is None or self.state is State.RELEASING:
-            return -1.0
-        return max(0.0, run.started + run.goal.delay - now)
 
     # What is asked
 
@@ -100,7 +54,7 @@ class GripperCoordinator:
             Refused: Not in this state, or the fingers cannot be moved or felt.
         """
         self._may(Event.CLOSE, now)
-        if self._release is not None:
+        if self._runs.release is not None:
             raise self._refuse("a release is due; cancel it first")
         if trouble := solver_trouble(self.fingers.values(), now, self.settings):
             raise self._refuse(trouble)
@@ -108,8 +62,8 @@ class GripperCoordinator:
             missing = [n for n in goal.required if not self.grip.touches(self.fingers[n])]
             if missing or goal.thing not in ("", self.grip.thing):
                 raise self._refuse("something else is held; release it first")
-        self._end_grasp(Outcome(End.FAILED, "a newer grasp took its place"))
-        run = self._grasp = Run(goal, now)
+        self._runs.end_grasp(Outcome(End.FAILED, "a newer grasp took its place"))
+        run = self._runs.grasp = Run(goal, now)
         self.refusal = ""
         if self.state is State.HOLDING:
             self.grip.commit(goal.force)
@@ -132,28 +86,77 @@ class GripperCoordinator:
             Refused: Not in this state, or the fingers cannot be moved.
         """
         self._may(Event.RELEASE, now)
-        self._end_release(Outcome(End.FAILED, "a newer release took its place"))
-        self._release = Run(goal, now)
+        self._runs.end_release(Outcome(End.FAILED, "a newer release took its place"))
+        self._runs.release = Run(goal, now)
         self.refusal = ""
-        return self._release
+        return self._runs.release
 
-    def cancel(self, run: Run[GraspGoal] | Run[ReleaseGoal]) -> None:
+    def move(self, goal: MoveGoal, now: float) -> MoveRun:
+        """Begin to move what is held; a motion under way gives way to this one.
+
+        Raises:
+            Refused: Nothing is held, or it is not known how; or the fingers cannot be moved.
+        """
+        self._may(Event.MOVE, now)
+        if self._runs.release is not None:
+            raise self._refuse("a release is due; cancel it first")
+        trouble = solver_trouble(self.fingers.values(), now, self.settings)
+        if trouble := trouble or self.thing.trouble(now, self.settings):
+            raise self._refuse(trouble)
+        thing, least = self.thing.newest, self.settings.move_stop_margin
+        if thing is not None and thing.name != (self.grip.thing or thing.name):
+            raise self._refuse(f"the solver tells of {thing.name!r}, held is {self.grip.thing!r}")
+        if thing is not None and thing.margin < least:
+            raise self._refuse(f"friction margin: {thing.margin:.3f} is below {least:g}")
+        if not self.grip.complete:
+            raise self._refuse(self._not_gripped())
+        self._runs.end_grasp(Outcome(End.FAILED, "a motion came"))
+        self._runs.end_move(Outcome(End.FAILED, "a newer motion took its place"))
+        run = self._runs.move = MoveRun(goal, now)
+        self.refusal = ""
+        self._moving = Moving(self.fingers, self.grip, self.thing, run, self.settings, now)
+        self._fire(Event.MOVE, "moving the object")
+        return run
+
+    @property
+    def plan_wanted(self) -> MoveRun | None:
+        """The motion that a plan is waited for; None: none."""
+        moving = self._moving
+        if moving is None or self.state is not State.MOVING or not moving.wants_plan:
+            return None
+        return moving.run
+
+    def take_plan(self, run: MoveRun, answer: MovePath | CcrError) -> None:
+        """Take the plan of a motion, or why there is none; too late for another motion than now."""
+        if self._moving is not None and self.plan_wanted is run:
+            self._moving.take(answer)
+
+    def cancel(self, run: Run[GraspGoal] | Run[ReleaseGoal] | MoveRun) -> None:
         """Give up a run: the fingers keep the pulls they have, and with them what they grip."""
-        if run is self._grasp:
-            self._end_grasp(Outcome(End.CANCELED, "cancelled; the fingers keep what they grip"))
+        if run is self._runs.grasp:
+            self._runs.end_grasp(
+                Outcome(End.CANCELED, "cancelled; the fingers keep what they grip")
+            )
             if self.state is State.HOLDING:
                 self.grip.commit(None)
             else:
                 self._freeze(Event.STOP, "the grasp was cancelled")
-        elif run is self._release:
+        elif run is self._runs.release:
             begun = self.state is State.RELEASING
-            self._end_release(Outcome(End.CANCELED, "cancelled" if begun else "kept: cancelled"))
+            self._runs.end_release(
+                Outcome(End.CANCELED, "cancelled" if begun else "kept: cancelled")
+            )
             if begun:
                 self._freeze(Event.STOP, "the release was cancelled")
+        elif run is self._runs.move:
+            text = "cancelled; the object is held where it is"
+            self._runs.end_move(Outcome(End.CANCELED, text))
+            self.grip.commit(None)
+            self._fire(Event.MOVED, text)
 
     def stop(self) -> str:
         """Freeze all fingers where they are; nothing is let go of, and a waiting release is off."""
-        self._end_all("stopped")
+        self._runs.end_all("stopped")
         if self.state is State.FAULT:
             return f"nothing moves: {self.message}"
         self._freeze(Event.STOP, "stopped")
@@ -165,19 +168,22 @@ class GripperCoordinator:
         Raises:
             Refused: Not in this state, or the grip is not complete.
         """
-        if self.state is not State.HOLDING:
+        if self.state is State.MOVING:
+            self._runs.end_all("held where it is")
+            self.grip.commit(None)
+            self._fire(Event.HOLD, "holding")
+        elif self.state is not State.HOLDING:
             self._may(Event.HOLD, now)
             if trouble := solver_trouble(self.fingers.values(), now, self.settings):
                 raise self._refuse(trouble)
             if not self.grip.complete:
-                names = [f.name for f in self.grip.needed if not self.grip.agrees(f)]
-                raise self._refuse(f"nothing is gripped: {', '.join(names)} does not press")
+                raise self._refuse(self._not_gripped())
             self._take_up()
             self.grip.commit(None)
-            self._end_all("held as it is")
+            self._runs.end_all("held as it is")
             self._fire(Event.HOLD, "holding")
         else:
-            self._end_release(Outcome(End.FAILED, "off: hold was called"))
+            self._runs.end_release(Outcome(End.FAILED, "off: hold was called"))
         self.refusal = ""
         return "holding"
 
@@ -206,10 +212,10 @@ class GripperCoordinator:
             self._find_out(now)
             return
         if trouble := self._trouble(now):
-            self._end_all(trouble)
+            self._runs.end_all(trouble)
             self._freeze(Event.FAIL, trouble)
             return
-        run = self._release
+        run = self._runs.release
         if run is not None and self.release_in(now) == 0.0:
             self._begin_releasing(run.goal, now)
         if self.state in (State.OPENING, State.RELEASING) and self._opening is not None:
@@ -218,7 +224,12 @@ class GripperCoordinator:
             self._take(self._closing.step(now, seconds), now)
         elif self.state is State.HOLDING:
             self._hold_on(now)
-        if self._grasp is not None and now - self._grasp.started > self._grasp.goal.timeout:
+        elif self.state is State.MOVING and self._moving is not None:
+            self._take_move(self._moving.step(now, seconds))
+        if (
+            self._runs.grasp is not None
+            and now - self._runs.grasp.started > self._runs.grasp.goal.timeout
+        ):
             self._time_out()
 
     def _find_out(self, now: float) -> None:
@@ -246,7 +257,7 @@ class GripperCoordinator:
         if not self.commanding:
             return ""
         trouble = bridge_trouble(fingers, self.servos, now, self.settings)
-        if not trouble and self.state in (State.CLOSING, State.HOLDING):
+        if not trouble and self.state in _FEELING:
             trouble = solver_trouble(fingers, now, self.settings)
         return trouble
 
@@ -254,44 +265,45 @@ class GripperCoordinator:
         if opening.step(now, seconds):
             if self.state is State.RELEASING:
                 self._fire(Event.RELEASED, "open")
-                self._end_release(Outcome(End.DONE, "released", reached=True))
+                self._runs.end_release(Outcome(End.DONE, "released", reached=True))
                 return
             self._fire(Event.OPENED, self.message)
-            if self._grasp is not None:
+            if self._runs.grasp is not None:
                 self._begin_closing()
         elif trouble := opening.trouble(now):
-            self._end_all(trouble, stalled=True)
+            self._runs.end_all(trouble, stalled=True)
             self._freeze(Event.STOP, trouble)
 
     def _hold_on(self, now: float) -> None:
+        self._keeper.step()
         if lost := self.grip.hold(now):
             reason = f"{lost} lost the object"
-            self._end_all(reason)
+            self._runs.end_all(reason)
             self._freeze(Event.FAIL, reason)
             return
-        run = self._grasp
+        run = self._runs.grasp
         if run is None:
             return
         tolerance = self.settings.force_tolerance
         near = all(
-            abs(self.grip.force(f) - run.goal.force) <= tolerance and self.grip.known(f)
+            abs(self.grip.force(f) - self.target_force) <= tolerance and self.grip.known(f)
             for f in self.grip.needed
         )
         if self._pressed.holds(near and self.grip.complete, now, self.settings.settle_time):
-            self._end_grasp(Outcome(End.DONE, "held with the new force", reached=True))
+            self._runs.end_grasp(Outcome(End.DONE, "held with the new force", reached=True))
 
     def _time_out(self) -> None:
-        if self._grasp is not None:
-            text = f"not done within {self._grasp.goal.timeout:g} s"
-            self._end_grasp(Outcome(End.FAILED, text, stalled=True))
+        if self._runs.grasp is not None:
+            text = f"not done within {self._runs.grasp.goal.timeout:g} s"
+            self._runs.end_grasp(Outcome(End.FAILED, text, stalled=True))
             if self.state is not State.HOLDING:
                 self._freeze(Event.STOP, text)
 
     def _take(self, verdict: Verdict | None, now: float) -> None:
-        if verdict is None or self._grasp is None:
+        if verdict is None or self._runs.grasp is None:
             return
-        goal, message = self._grasp.goal, verdict.outcome.message
-        self._end_grasp(verdict.outcome)
+        goal, message = self._runs.grasp.goal, verdict.outcome.message
+        self._runs.end_grasp(verdict.outcome)
         if verdict.event is Event.GRIP:
             self.grip.commit(goal.force)
             self._fire(Event.GRIP, message)
@@ -302,12 +314,23 @@ class GripperCoordinator:
         else:
             self._freeze(verdict.event, message)
 
+    def _take_move(self, verdict: Verdict | None) -> None:
+        if verdict is None:
+            return
+        self._runs.end_move(verdict.outcome)
+        if verdict.event is Event.MOVED:
+            self.grip.commit(None)
+            self._fire(Event.MOVED, verdict.outcome.message)
+        else:
+            self._runs.end_all(verdict.outcome.message)
+            self._freeze(verdict.event, verdict.outcome.message)
+
     # Changes
 
     def _begin_closing(self) -> None:
-        if self._grasp is None:
+        if self._runs.grasp is None:
             return
-        goal = self._grasp.goal
+        goal = self._runs.grasp.goal
         self._take_up()
         self.grip.thing, self.grip.required = goal.thing, goal.required
         self._closing = Closing(self.fingers, self.grip, goal, self.settings)
@@ -319,75 +342,11 @@ class GripperCoordinator:
         self._fire(event, message)
 
     def _begin_releasing(self, goal: ReleaseGoal, now: float) -> None:
-        self._end_grasp(Outcome(End.FAILED, "a release came"))
+        self._runs.end_grasp(Outcome(End.FAILED, "a release came"))
+        self._runs.end_move(Outcome(End.FAILED, "a release came", limiting="a release came"))
         self._take_up()
         self.grip.clear()
         fast, slow = self.settings.fast_release_speed, self.settings.slow_release_speed
         speed = fast if goal.fast else slow
         self._opening = Opening(self.fingers, self.settings, speed, goal.gap, now)
         self._fire(Event.RELEASE, "letting go")
-
-    def _take_up(self) -> None:
-        """Continue from where the fingers are; from the command where a grip depends on it."""
-        if self.commanding:
-            return
-        for finger in self.fingers.values():
-            if self.grip.committed:
-                finger.freeze(self.settings.place_tolerance)
-                finger.place = min(finger.place, finger.measured_place + self.settings.max_lead)
-            else:
-                finger.adopt()
-
-    def _adopt(self) -> None:
-        for finger in self.fingers.values():
-            finger.adopt()
-
-    def _freeze(self, event: Event, message: str) -> None:
-        for finger in self.fingers.values():
-            finger.freeze(self.settings.place_tolerance)
-        self._fire(event, message)
-
-    def _is_open(self) -> bool:
-        return is_open(tuple(self.fingers.values()), self.settings.place_tolerance)
-
-    def _fire(self, event: Event, message: str) -> None:
-        self._machine.fire(event)
-        self.message = message
-
-    def _may(self, event: Event, now: float) -> None:
-        state = self.state
-        if not self._adopted:
-            raise self._refuse(self._unknown(now))
-        grasping = event is Event.CLOSE and state in (State.IDLE, State.OPENING, State.HOLDING)
-        if not grasping and not self._machine.may(event):
-            hint = f" ({self.message}); reset it first" if state is State.FAULT else ""
-            raise self._refuse(f"the gripper is {state}{hint}")
-        if trouble := bridge_trouble(self.fingers.values(), self.servos, now, self.settings):
-            raise self._refuse(trouble)
-
-    def _unknown(self, now: float) -> str:
-        fingers = self.fingers.values()
-        return (
-            bridge_trouble(fingers, self.servos, now, self.settings)
-            or solver_trouble(fingers, now, self.settings)
-            or "the solver has not come to the measured pulls yet"
-        )
-
-    def _refuse(self, reason: str) -> Refused:
-        self.refusal = reason
-        return Refused(reason)
-
-    def _end_grasp(self, outcome: Outcome) -> None:
-        run, self._grasp = self._grasp, None
-        if run is not None:
-            run.finish(outcome)
-
-    def _end_release(self, outcome: Outcome) -> None:
-        run, self._release = self._release, None
-        if run is not None:
-            run.finish(outcome)
-
-    def _end_all(self, reason: str, stalled: bool = False) -> None:
-        outcome = Outcome(End.FAILED, reason, stalled=stalled)
-        self._end_grasp(outcome)
-        self._end_release(outcome)

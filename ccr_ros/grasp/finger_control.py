@@ -43,15 +43,24 @@ class FingerControl:
         cables: Names of its cables.
         path: Its pulls from open to closed.
         free: Its motion while it touches nothing.
+        pull_range: Lowest and highest pull (m, 2) [m] while an object is moved; None: those of the
+            path's two ends.
     """
 
     def __init__(
-        self, name: str, cables: tuple[str, ...], path: PullPath, free: FreeMotion
+        self,
+        name: str,
+        cables: tuple[str, ...],
+        path: PullPath,
+        free: FreeMotion,
+        pull_range: np.ndarray | None = None,
     ) -> None:
         self.name = name
         self.cables = cables
         self.path = path
         self.free = free
+        ends = np.column_stack([path.open, path.closed])
+        self.pull_range = np.sort(ends, axis=1) if pull_range is None else pull_range
 
         self.measured: np.ndarray | None = None  # pulls (m,) [m]
         self.measured_at = -math.inf  # s
@@ -124,6 +133,11 @@ class FingerControl:
         if self.measured is not None:
             self.place = self.path.place(self.measured)
             self._rest = self.measured - self.path.pulls(self.place)
+
+    def send(self, pulls: np.ndarray) -> None:
+        """Command pulls (m,) [m], wherever they are beside the path."""
+        self.place = self.path.place(pulls)
+        self._rest = pulls - self.path.pulls(self.place)
 
     def freeze(self, tolerance: float) -> None:
         """Command what is reached: where the finger is, if that is beyond the command.

@@ -34,6 +34,7 @@ class Grip:
         self.required: tuple[str, ...] = tuple(fingers)
         self.targets: dict[str, float] = {}  # [N] of the fingers whose force is regulated
         self.floors: dict[str, float] = {}  # [m]
+        self.extra = 0.0  # N beyond the targets; see `MarginKeeper`
         self._lost = {name: Lasting() for name in fingers}
         self._regulated: dict[str, float] = {}  # time of the pose that was last acted on, by finger
 
@@ -44,6 +45,7 @@ class Grip:
         self.required = tuple(self._fingers)
         self.targets.clear()
         self.floors.clear()
+        self.extra = 0.0
 
     # What is felt
 
@@ -97,7 +99,8 @@ class Grip:
         """Hold from now on: with this target [N], or each finger with the force it has."""
         for finger in self._fingers.values():
             if self.touches(finger) or finger.name in self.required:
-                self.targets[finger.name] = self.force(finger) if force is None else force
+                as_it_is = max(self.force(finger) - self.extra, 0.0)
+                self.targets[finger.name] = as_it_is if force is None else force
                 floor = self.floors.get(finger.name, finger.place)
                 self.floors[finger.name] = min(floor, finger.place)
         self.committed = True
@@ -129,7 +132,11 @@ class Grip:
     def hold(self, now: float) -> str:
         """Regulate all that hold; return the name of a required finger that lost touch, if any."""
         for name, target in self.targets.items():
-            self.regulate(self._fingers[name], target)
+            self.regulate(self._fingers[name], target + self.extra)
+        return self.lost(now)
+
+    def lost(self, now: float) -> str:
+        """Return the name of a required finger that lost touch ``loss_time`` ago, if any."""
         for finger in self.needed:
             lost = self._lost[finger.name]
             if lost.holds(not self.touches(finger), now, self._settings.loss_time):

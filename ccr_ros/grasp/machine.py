@@ -18,6 +18,7 @@ class State(StrEnum):
     READY = "ready"
     CLOSING = "closing"
     HOLDING = "holding"
+    MOVING = "moving"
     RELEASING = "releasing"
     STOPPED = "stopped"
     FAULT = "fault"
@@ -35,6 +36,8 @@ class Event(StrEnum):
     HOLD = "hold"  # what is touched shall be held
     ADOPT = "adopt"  # found holding at the start
     REGRIP = "regrip"  # hold on with another force
+    MOVE = "move"  # the object that is held shall be moved
+    MOVED = "moved"  # as far as it goes; it is held where it is now
     RELEASE = "release"
     RELEASED = "released"
     STOP = "stop"
@@ -44,8 +47,9 @@ class Event(StrEnum):
 
 _WORKING = tuple(state for state in State if state is not State.FAULT)
 
-# The only ways out of HOLDING are RELEASE and those that keep all pulls (STOP, FAIL). That STOPPED
-# and FAULT do so, and that REGRIP and MISS do not loosen a grip, is the coordinator's part.
+# The only ways out of HOLDING and MOVING are RELEASE and those that keep all pulls (STOP, FAIL).
+# That STOPPED and FAULT do so, and that REGRIP, MOVE and MISS do not loosen a grip, is the
+# coordinator's part.
 TRANSITIONS: tuple[tuple[Event, tuple[State, ...], State], ...] = (
     (Event.OPEN, (State.IDLE,), State.OPENING),
     (Event.OPENED, (State.OPENING,), State.READY),
@@ -53,9 +57,11 @@ TRANSITIONS: tuple[tuple[Event, tuple[State, ...], State], ...] = (
     (Event.MISS, (State.CLOSING,), State.OPENING),
     (Event.ARRIVE, (State.CLOSING,), State.READY),
     (Event.GRIP, (State.CLOSING,), State.HOLDING),
-    (Event.HOLD, (State.CLOSING, State.STOPPED), State.HOLDING),
+    (Event.HOLD, (State.CLOSING, State.STOPPED, State.MOVING), State.HOLDING),
     (Event.ADOPT, (State.IDLE,), State.HOLDING),
     (Event.REGRIP, (State.HOLDING,), State.HOLDING),
+    (Event.MOVE, (State.HOLDING, State.MOVING), State.MOVING),
+    (Event.MOVED, (State.MOVING,), State.HOLDING),
     (Event.RELEASE, tuple(s for s in _WORKING if s is not State.RELEASING), State.RELEASING),
     (Event.RELEASED, (State.RELEASING,), State.READY),
     (Event.STOP, _WORKING, State.STOPPED),

@@ -4,32 +4,33 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TypeVar
+
+import numpy as np
 
 from .finger_control import FingerControl
 from .settings import GraspSettings
-
-Key = TypeVar("Key")
 
 
 class Progress:
     """Watches whether fingers follow their commands.
 
     A finger has stalled when it is off its command by more than the tolerance and has not moved
-    by a quarter of that for ``stall_time``.
+    by a quarter of that for ``stall_time``, whichever of its cables it is.
     """
 
     def __init__(self, settings: GraspSettings) -> None:
         self._settings = settings
-        self._anchors: dict[str, tuple[float, float]] = {}  # place and time by finger
+        self._anchors: dict[str, tuple[np.ndarray, float]] = {}  # pulls and time by finger
 
     def stalled(self, fingers: Sequence[FingerControl], now: float) -> str:
         """Return the name of a finger that has stalled, or nothing."""
         tolerance = self._settings.place_tolerance
         for finger in fingers:
-            at = finger.measured_place
-            place, since = self._anchors.setdefault(finger.name, (at, now))
-            if abs(at - place) > tolerance / 4 or abs(finger.place - at) <= tolerance:
+            command = finger.command
+            at = command if finger.measured is None else finger.measured
+            pulls, since = self._anchors.setdefault(finger.name, (at, now))
+            moves = float(np.abs(at - pulls).max()) > tolerance / 4
+            if moves or float(np.abs(command - at).max()) <= tolerance:
                 self._anchors[finger.name] = (at, now)
             elif now - since >= self._settings.stall_time:
                 return finger.name

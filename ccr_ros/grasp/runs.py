@@ -35,12 +35,14 @@ class Outcome:
         message: What happened, in words.
         reached: What was asked for is so: the force is the target, or the fingers are open.
         stalled: The fingers came to a stop before that.
+        limiting: What kept an object from being moved as asked; empty: nothing, or no motion.
     """
 
     end: End
     message: str
     reached: bool = False
     stalled: bool = False
+    limiting: str = ""
 
 
 @dataclass(frozen=True)
@@ -82,7 +84,7 @@ class ReleaseGoal:
     gap: float = math.inf
 
 
-Goal = TypeVar("Goal", GraspGoal, ReleaseGoal)
+Goal = TypeVar("Goal")
 
 
 @dataclass(eq=False)

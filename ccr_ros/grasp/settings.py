@@ -118,6 +118,38 @@ class GraspSettings:
         "s",
         "Longest time of opening the fingers, at a release or before a grasp.",
     )
+    hold_margin: float = _setting(
+        0.0,
+        0.0,
+        0.95,
+        "1",
+        "While holding, the force is raised by what keeps the smallest friction margin of the "
+        "contacts at least this, as long as the solver tells of it; 0: it is not.",
+    )
+    margin_gain: float = _setting(
+        0.3, 1e-4, 1e3, "N/s", "Rate at which it is raised, per missing margin."
+    )
+    margin_band: float = _setting(
+        0.05, 0.0, 0.5, "1", "Margin beyond hold_margin from which on it is lowered again."
+    )
+    move_speed: float = _setting(
+        0.0005, 1e-6, 0.1, "m/s", "Speed of a motion of the object, when the goal says none."
+    )
+    move_lead: float = _setting(
+        0.00015, 1e-6, 0.1, "m", "Farthest that its commands are ahead of the newest solved pose."
+    )
+    move_stop_margin: float = _setting(
+        0.02, 0.0, 0.95, "1", "A motion ends where the smallest friction margin is below this."
+    )
+    move_shift_tolerance: float = _setting(
+        0.0005, 1e-6, 0.1, "m", "The object is where it shall be when it is off by at most this."
+    )
+    move_turn_tolerance: float = _setting(
+        0.02, 1e-5, 1.0, "rad", "And when it is turned as far as asked within this."
+    )
+    plan_timeout: float = _setting(
+        90.0, 0.1, 3600.0, "s", "Longest that a plan of a motion may take."
+    )
 
     def __post_init__(self) -> None:
         for item in fields(self):

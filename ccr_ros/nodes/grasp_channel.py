@@ -15,8 +15,8 @@ from std_msgs.msg import Header
 from tf2_ros import TransformBroadcaster
 
 from ccr_ros.grasp.live import LiveGrasp
-from ccr_ros.grasp.statics import Body, GraspSolution, ObjectContact
-from ccr_ros.model import InvalidValue, MountedFinger, Obstacle, Solution
+from ccr_ros.grasp.statics import Body, GraspSolution, GraspSolver, ObjectContact
+from ccr_ros.model import Finger, InvalidValue, MountedFinger, Obstacle, Solution
 from ccr_ros.viz.solids import SolidObject
 
 from .backlog import Backlog
@@ -31,6 +31,7 @@ from .quality_watch import QualityWatch
 
 _TIMES_KEPT = 1000  # solve times, for the percentiles
 _WARN_EVERY = 2.0  # s
+_PLAN_STEP = 0.3  # s of CPU; so long may live pulls have to wait for a solve of a plan
 
 
 class GraspChannel:
@@ -83,6 +84,11 @@ class GraspChannel:
     def live(self) -> LiveGrasp | None:
         """The object and what became of it; None: there is no object."""
         return self._live
+
+    @property
+    def by_name(self) -> dict[str, Finger]:
+        """The fingers by name."""
+        return {channel.finger.name: channel.finger for channel in self._fingers}
 
     @property
     def fault(self) -> str:
@@ -186,6 +192,24 @@ class GraspChannel:
         here = live.body.shape.moved(channel.base.inverse() @ live.body.pose)
         channel.set_obstacles((*_others(channel, here.name), here))
         channel.solver.solve(channel.solution.pulls)
+
+    def plan_solver(self) -> GraspSolver:
+        """Return a solver to plan on, which stands where object and fingers are.
+
+        Raises:
+            InvalidValue: There is no object, the fingers do not carry it, or where it is is not
+                known.
+        """
+        live = self._live
+        if live is None or live.solution is None:
+            raise InvalidValue("object", None, "one that the fingers carry; there is none")
+        allowed = "asked while the fingers carry it"
+        if not live.held:
+            why = live.failure or live.refusal or "it stands"
+            raise InvalidValue("object", live.body.name, f"{allowed} ({why})")
+        if self._stale:
+            raise InvalidValue("object", live.body.name, f"{allowed} and no pose is stale")
+        return live.copy(_PLAN_STEP)
 
     # The worker
 

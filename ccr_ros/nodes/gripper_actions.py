@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The coordinator's actions: grasp, release and, where control_msgs is there, gripper_cmd."""
+"""The coordinator's actions: grasp, release and, where control_msgs is there, gripper_cmd.
+
+Those that move what is held are in `move_actions`.
+"""
 
 from __future__ import annotations
 
@@ -16,6 +19,7 @@ from ccr_ros.grasp.runs import End, Outcome, Run, grasp_goal, release_goal
 from ccr_ros.model import checks
 
 from .goal_desk import GoalDesk
+from .move_actions import MoveActions
 
 _SAME_GAP = 0.0005  # m; gripper_cmd positions that differ by less ask for no motion outwards
 
@@ -60,6 +64,7 @@ class GripperActions:
                 self._release_result,
                 self._release_feedback,
             ),
+            *MoveActions(node, gripper, clock).desks,
         ]
         if find_spec("control_msgs") is not None:
             from control_msgs.action import GripperCommand

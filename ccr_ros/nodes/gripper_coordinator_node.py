@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""gripper_coordinator_node: grasps, holds and lets go.
+"""gripper_coordinator_node: grasps, holds, moves what it holds, and lets go.
 
 Topics, actions, services and parameters: docs/interfaces.md; what it does: docs/grasping.md.
 """
@@ -10,7 +10,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from ccr_msgs.msg import CablePulls, FingerGrip, FingerState, GripperState, ServoState
+from ccr_msgs.msg import CablePulls, FingerGrip, FingerState, GraspState, GripperState, ServoState
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.clock import Clock, ClockType
 from rclpy.context import Context
@@ -28,6 +28,8 @@ from . import gripper_parameters, runner
 from .conversions import pulls_from_message
 from .diagnostics import make_status
 from .gripper_actions import GripperActions
+from .move_client import MoveClient
+from .move_conversions import held_object
 from .qos import COMMAND, DIAGNOSTICS, LATCHED
 
 _WARN_EVERY = 2.0  # s
@@ -74,6 +76,7 @@ class GripperCoordinatorNode(Node):
             solved = partial(self._hear_state, control)
             self.create_subscription(FingerState, f"{name}/state", solved, LATCHED)
         self.create_subscription(ServoState, "servo_state", self._hear_servos, LATCHED)
+        self.create_subscription(GraspState, "grasp_state", self._hear_grasp, LATCHED)
 
         self._state = self.create_publisher(GripperState, "gripper_state", LATCHED)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", DIAGNOSTICS)
@@ -81,6 +84,7 @@ class GripperCoordinatorNode(Node):
         self._commanded_until = -1.0
 
         self._actions = GripperActions(self, self._gripper, self._now, self._fingers)
+        self._plans = MoveClient(self, self._gripper)
         for name, call in (
             ("stop", lambda: self._gripper.stop()),
             ("hold", lambda: self._gripper.hold(self._now())),
@@ -119,6 +123,12 @@ class GripperCoordinatorNode(Node):
         for finger in self._gripper.fingers.values():
             finger.servo_tensions = convert.servo_tensions(message, finger)
 
+    def _hear_grasp(self, message: GraspState) -> None:
+        try:
+            self._gripper.thing.hear(held_object(message), self._now())
+        except CcrError as error:
+            self._warn(f"state of the object refused: {error}")
+
     def _warn(self, text: str) -> None:
         self.get_logger().warning(text, throttle_duration_sec=_WARN_EVERY)
 
@@ -143,6 +153,7 @@ class GripperCoordinatorNode(Node):
 
     def _step(self) -> None:
         self._gripper.step(self._now())
+        self._plans.step()
         self._command()
         self._actions.answer()
         self._tell_changes()

@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from typing import Any
 
+import numpy as np
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -14,7 +15,7 @@ from ccr_ros.grasp.finger_control import FingerControl
 from ccr_ros.grasp.free_motion import free_motion
 from ccr_ros.grasp.pull_path import CLOSED_FRACTION, PullPath, pull_path
 from ccr_ros.grasp.settings import GraspSettings
-from ccr_ros.model import Finger, Gripper, load_gripper
+from ccr_ros.model import Finger, Gripper, InvalidValue, load_gripper
 from ccr_ros.resources import find_config
 
 from .declarations import Declarations
@@ -28,6 +29,7 @@ class GripperParameters:
         gripper: From the gripper file.
         settings: Speeds, forces and times.
         paths: Of the fingers' pulls, in the gripper's order.
+        ranges: Lowest and highest pull (m, 2) [m] of each finger while an object is moved.
         control_rate: Steps per second [Hz].
         state_rate: GripperState and feedback messages per second [Hz].
     """
@@ -35,6 +37,7 @@ class GripperParameters:
     gripper: Gripper
     settings: GraspSettings
     paths: tuple[PullPath, ...]
+    ranges: tuple[np.ndarray, ...]
     control_rate: float
     state_rate: float
 
@@ -50,8 +53,11 @@ class GripperParameters:
                 mounted.finger.cable_names,
                 path,
                 free_motion(mounted, path),
+                pulls,
             )
-            for mounted, path in zip(self.gripper.fingers, self.paths, strict=True)
+            for mounted, path, pulls in zip(
+                self.gripper.fingers, self.paths, self.ranges, strict=True
+            )
         ]
 
 
@@ -88,7 +94,12 @@ def declare(node: Node) -> GripperParameters:
         )
     gripper = load_gripper(find_config(file))
     paths = tuple(_path(node, mounted.finger) for mounted in gripper.fingers)
-    return GripperParameters(gripper, GraspSettings(**values), paths, control_rate, state_rate)
+    ranges = tuple(
+        _range(node, mounted.finger, path)
+        for mounted, path in zip(gripper.fingers, paths, strict=True)
+    )
+    settings = GraspSettings(**values)
+    return GripperParameters(gripper, settings, paths, ranges, control_rate, state_rate)
 
 
 def _path(node: Node, finger: Finger) -> PullPath:
@@ -99,6 +110,25 @@ def _path(node: Node, finger: Finger) -> PullPath:
         _pulls(node, finger, "open", [0.0] * count, "open; nothing is touched there"),
         _pulls(node, finger, "closed", closed, "as far closed as it may ever go"),
     )
+
+
+def _range(node: Node, finger: Finger, path: PullPath) -> np.ndarray:
+    """Return the pulls (m, 2) [m] that a motion of the object may use."""
+    low, high = np.minimum(path.open, path.closed), np.maximum(path.open, path.closed)
+    columns = []
+    for key, default, what in (("least", low, "let out"), ("largest", high, "pulled")):
+        text = f"as far {what} as a motion of the object may want"
+        values = _pulls(node, finger, key, default.tolist(), text)
+        try:
+            columns.append(finger.pulls_array(values or []))
+        except InvalidValue as error:
+            inner = error.place.removeprefix("pulls")
+            place = f"{finger.name}.{key}_pulls{inner}"
+            raise InvalidValue(place, error.value, error.allowed) from None
+    if (columns[0] > columns[1]).any():
+        allowed = f"no more than largest_pulls, {columns[1].tolist()}"
+        raise InvalidValue(f"{finger.name}.least_pulls", columns[0].tolist(), allowed)
+    return np.column_stack(columns)
 
 
 def _pulls(node: Node, finger: Finger, key: str, default: Any, what: str) -> list[float] | None:

@@ -42,6 +42,8 @@ class SolverParameters:
         gravity: (3,) [m/s^2] in the gripper's frame.
         grasp_state_rate: Most messages per second [Hz].
         quality_rate: Most measurements of the grasp's quality per second [Hz].
+        move_margin: Least friction margin of a planned motion, if the request says none.
+        move_time_limit: Longest that planning a motion may take [s].
     """
 
     gripper: Gripper
@@ -53,6 +55,8 @@ class SolverParameters:
     gravity: np.ndarray
     grasp_state_rate: float
     quality_rate: float
+    move_margin: float
+    move_time_limit: float
 
 
 def declare(node: Node) -> SolverParameters:
@@ -135,6 +139,19 @@ def declare(node: Node) -> SolverParameters:
         " some 30 ms, and pulls wait meanwhile.",
         (0.05, 100.0),
     )
+    move_margin = parameters.fixed(
+        "move_margin",
+        0.1,
+        "Least friction margin of every contact in a motion that ~/plan_move plans, where the"
+        " request says none.",
+        (0.0, 0.99),
+    )
+    move_time_limit = parameters.fixed(
+        "move_time_limit",
+        60.0,
+        "Longest that ~/plan_move may plan [s]; it then answers with what it has.",
+        (0.1, 3600.0),
+    )
     parameters.live(MARKERS, True, "Publish markers for RViz and the like.")
     parameters.live(
         MARKER_RATE,
@@ -156,6 +173,8 @@ def declare(node: Node) -> SolverParameters:
         gravity=checks.vector("gravity", list(gravity), 3, unit="m/s^2", largest=1e3),
         grasp_state_rate=grasp_state_rate,
         quality_rate=quality_rate,
+        move_margin=move_margin,
+        move_time_limit=move_time_limit,
     )
 
 

@@ -31,6 +31,7 @@ from .finger_channel import FingerChannel
 from .frames import FingerFrames
 from .grasp_channel import GraspChannel
 from .grasp_diagnostics import grasp_status, grasp_verdict
+from .move_service import MoveService
 from .pull_service import PullService
 from .qos import COMMAND, DIAGNOSTICS, LATCHED
 from .scene import ObjectScene
@@ -93,6 +94,9 @@ class SolverNode(Node):
 
         prepare = None if self._grasp is None else self._grasp.prepare
         self._pulls = PullService(self, self._fingers, self._wake.trigger, prepare)
+        self._moves = MoveService(
+            self, self._grasp, fixed.move_margin, fixed.move_time_limit, self._wake.trigger
+        )
 
         self._markers = self.create_publisher(MarkerArray, "markers", LATCHED)
         self._scene = SceneMarkers()
@@ -115,7 +119,7 @@ class SolverNode(Node):
         """Take new objects in, solve one finger, or all at once where they have an object in hand;
         come back for more when others were served.
 
-        A request for pulls is worked on besides, for the time of one solve.
+        Requests for pulls and plans are worked on besides, each for the time of one solve.
         """
         message, self._objects_message = self._objects_message, None
         if message is not None:
@@ -125,8 +129,9 @@ class SolverNode(Node):
             self._grasp.tell()
         self._report_change()
         self._pulls.work()
+        self._moves.work()
         unsolved = self._objects_message is not None or any(c.unsolved for c in self._fingers)
-        if unsolved or self._pulls.busy:
+        if unsolved or self._pulls.busy or self._moves.busy:
             self._wake.trigger()
 
     def _solve_next(self) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 import rclpy
+from cube_stack import CubeStack
 from gripper_stack import GripperStack
 from probe import Probe
 from rclpy.context import Context
@@ -67,6 +68,20 @@ def stack(context: Context, probe: Probe) -> Iterator[Callable[..., GripperStack
 
     def start(**values: Any) -> GripperStack:
         started.append(GripperStack(context, probe, **values))
+        return started[-1]
+
+    yield start
+    for stack in started:
+        stack.close()
+
+
+@pytest.fixture
+def cube(context: Context, probe: Probe) -> Iterator[Callable[..., CubeStack]]:
+    """Return a function that starts the nodes of the cube's gripper."""
+    started = []
+
+    def start(**values: Any) -> CubeStack:
+        started.append(CubeStack(context, probe, **values))
         return started[-1]
 
     yield start

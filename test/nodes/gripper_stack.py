@@ -147,23 +147,32 @@ class GripperStack:
         at: float = OPEN,
         bridge: Any = None,
         mode: str = "fingers",
+        solver: dict[str, Any] | None = None,
+        start: bool = True,
         **values: Any,
     ) -> None:
         self.context = context
         self.probe = probe
         self._ended: list[Node] = []
-        overrides = [Parameter("mode", value=mode)]
+        parameters = {"mode": mode} if solver is None else solver
+        overrides = [Parameter(name, value=value) for name, value in parameters.items()]
         self.solver = probe.add(
             SolverNode(context=context, namespace="gripper", parameter_overrides=overrides)
         )
         self.bridge = bridge or probe.add(FakeBridge(context, at))
-        self.node = self.start_coordinator(**values)
+        self._values = values
+        if start:
+            self.start()
         self.clients = {
             kind: ActionClient(probe.node, kind, name)
             for kind, name in ((Grasp, "grasp"), (Release, "release"))
         }
         self.states: list[GripperState] = []
         probe.node.create_subscription(GripperState, "gripper_state", self.states.append, LATCHED)
+
+    def start(self) -> None:
+        """Start the coordinator with the parameters that were given."""
+        self.node = self.start_coordinator(**self._values)
 
     def start_coordinator(self, **values: Any) -> GripperCoordinatorNode:
         settings = {**QUICK, **values}
