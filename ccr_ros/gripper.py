@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A gripper in a person's words: grasp, hold, release, stop.
+"""A gripper in a person's words: grasp, hold, move, rotate, release, stop.
 
     from ccr_ros.gripper import Gripper
 
@@ -23,9 +23,12 @@ from typing import Any
 from ccr_ros.gripper_reports import (
     GraspReport,
     GripperReport,
+    MoveReport,
     grasp_report,
     gripper_report,
+    move_report,
 )
+from ccr_ros.model import checks
 from ccr_ros.model.errors import CcrError
 from ccr_ros.runtime import enable_ros
 
@@ -53,7 +56,7 @@ class GripperFailed(GripperError):
         report: What became of it.
     """
 
-    def __init__(self, report: GripperReport) -> None:
+    def __init__(self, report: GripperReport | MoveReport) -> None:
         self.report = report
         super().__init__(report.message)
 
@@ -73,8 +76,9 @@ class Gripper:
     def __init__(self, namespace: str = "/gripper", timeout: float = 10.0) -> None:
         enable_ros()
         import rclpy
-        from ccr_msgs.action import Grasp, Release
+        from ccr_msgs.action import Grasp, MoveObject, Release, Rotate
         from ccr_msgs.msg import GraspState, GripperState
+        from geometry_msgs.msg import Vector3
         from rclpy.action import ActionClient
         from rclpy.context import Context
         from rclpy.executors import SingleThreadedExecutor
@@ -96,9 +100,15 @@ class Gripper:
         self._executor.add_node(self._node)
         self._actions = {
             kind: ActionClient(self._node, kind, name)
-            for kind, name in ((Grasp, "grasp"), (Release, "release"))
+            for kind, name in (
+                (Grasp, "grasp"),
+                (Release, "release"),
+                (MoveObject, "move_object"),
+                (Rotate, "rotate"),
+            )
         }
         self._grasp_type, self._release_type = Grasp, Release
+        self._move_type, self._rotate_type, self._vector = MoveObject, Rotate, Vector3
         self._services = {
             name: self._node.create_client(Trigger, name) for name in ("stop", "hold", "reset")
         }
@@ -163,6 +173,66 @@ class Gripper:
         )
         result = self._achieve(self._grasp_type, goal, timeout + _MARGIN)
         return self._judge(result, result.reached)
+
+    def move(
+        self,
+        shift: Sequence[float] = (0.0, 0.0, 0.0),
+        turn: Sequence[float] = (0.0, 0.0, 0.0),
+        *,
+        margin: float = 0.0,
+        duration: float = 0.0,
+        speed: float = 0.0,
+        partial: bool = False,
+        timeout: float = 300.0,
+    ) -> MoveReport:
+        """Shift and turn what is held, without letting a contact slip; return when it is there.
+
+        Args:
+            shift: (3,) [m] of its centre, in the gripper's frame.
+            turn: (3,) rotation vector [rad] about its centre, in the gripper's frame.
+            margin: Least friction margin of every contact, below 1; 0: the solver's default.
+            duration: Of the motion [s]; 0: as the speed says. Not both.
+            speed: Of the cable that moves most [m/s]; 0: the coordinator's default.
+            partial: Where the target cannot be reached, go as far as is possible, and return that.
+            timeout: Of planning and motion [s]; then it is cancelled.
+
+        Raises:
+            InvalidValue: A shift or turn that is not three numbers.
+            GripperRefused: Nothing is held, or not these values.
+            GripperFailed: It is not there; the report names the constraint that keeps it from
+                there, and where it is. It is still held.
+            NoGripper: The coordinator went silent. As with any error while it waits, and with an
+                interrupt, the motion is cancelled.
+        """
+        goal = self._move_type.Goal(
+            shift=self._vector_of("shift", shift),
+            turn=self._vector_of("turn", turn),
+            margin=float(margin),
+            duration=float(duration),
+            speed=float(speed),
+            partial=bool(partial),
+        )
+        return self._moved(self._achieve(self._move_type, goal, timeout), partial)
+
+    def rotate(
+        self,
+        angle: float,
+        *,
+        margin: float = 0.0,
+        duration: float = 0.0,
+        speed: float = 0.0,
+        partial: bool = False,
+        timeout: float = 300.0,
+    ) -> MoveReport:
+        """Turn what is held about the gripper's z axis by an angle [rad]; else as `move`."""
+        goal = self._rotate_type.Goal(
+            angle=float(angle),
+            margin=float(margin),
+            duration=float(duration),
+            speed=float(speed),
+            partial=bool(partial),
+        )
+        return self._moved(self._achieve(self._rotate_type, goal, timeout), partial)
 
     def hold(self) -> GripperReport:
         """Hold what is gripped as it is; a release that waits is off.
@@ -298,6 +368,17 @@ class Gripper:
     def _reason(self) -> str:
         self._newer()
         return self._latest.refusal or "the gripper refuses, and does not say why"
+
+    def _vector_of(self, place: str, values: Sequence[float]) -> Any:
+        x, y, z = checks.vector(place, values, 3)
+        return self._vector(x=float(x), y=float(y), z=float(z))
+
+    def _moved(self, result: Any, partial: bool) -> MoveReport:
+        report = move_report(result)
+        as_far = partial and report.limiting and report.fraction == 1.0
+        if not (report.done or as_far):
+            raise GripperFailed(report)
+        return report
 
     def _judge(self, result: Any, done: bool) -> GripperReport:
         report = gripper_report(result, done)

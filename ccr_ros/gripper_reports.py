@@ -31,6 +31,34 @@ class GripperReport:
 
 
 @dataclass(frozen=True)
+class MoveReport:
+    """How a motion of what is held ended, in the gripper's frame.
+
+    Attributes:
+        state: As in ``ccr_msgs/msg/GripperState``.
+        message: What happened.
+        done: The object is measured where it was asked to be.
+        limiting: The constraint that refused or stopped it; empty: none did.
+        shift: (x, y, z) of its centre [m], from where it was; turn: rotation vector [rad].
+        position: (x, y, z) of its centre [m].
+        orientation: (x, y, z, w).
+        margin: Smallest friction margin of its contacts; nan: not known, or without friction.
+        fraction: Of the planned pulls that the fingers were sent, from 0 to 1.
+    """
+
+    state: str
+    message: str
+    done: bool
+    limiting: str
+    shift: tuple[float, float, float]
+    turn: tuple[float, float, float]
+    position: tuple[float, float, float]
+    orientation: tuple[float, float, float, float]
+    margin: float
+    fraction: float
+
+
+@dataclass(frozen=True)
 class GraspReport:
     """What the solver says of the object in hand, in the gripper's frame.
 
@@ -76,6 +104,24 @@ def gripper_report(message: Any, done: bool) -> GripperReport:
         in_contact=touching,
         object_held=getattr(message, "object_held", message.state == "holding"),
         release_in=getattr(message, "release_in", -1.0),
+    )
+
+
+def move_report(message: Any) -> MoveReport:
+    """Return the report in a result of ``MoveObject`` or ``Rotate``."""
+    motion = message.motion
+    p, q = motion.pose.position, motion.pose.orientation
+    return MoveReport(
+        state=message.state,
+        message=message.message,
+        done=message.reached,
+        limiting=message.limiting,
+        shift=(motion.shift.x, motion.shift.y, motion.shift.z),
+        turn=(motion.turn.x, motion.turn.y, motion.turn.z),
+        position=(p.x, p.y, p.z),
+        orientation=(q.x, q.y, q.z, q.w),
+        margin=motion.margin,
+        fraction=motion.fraction,
     )
 
 

@@ -36,6 +36,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "bench": ("ccr_ros.cli.bench", "measure speed and accuracy next to other solvers"),
     "run": ("ccr_ros.cli.run", "run a node"),
     "up": ("ccr_ros.cli.up", "run all nodes of a gripper in one terminal"),
+    "gripper": ("ccr_ros.cli.gripper", "grasp, move, rotate and release with a gripper that runs"),
     "topic": ("ccr_ros.cli.ros.topic", "list, echo, publish and measure topics"),
     "node": ("ccr_ros.cli.ros.node", "list nodes, and tell what one has"),
     "service": ("ccr_ros.cli.ros.service", "list and call services"),
