@@ -6,7 +6,8 @@ import json
 import numpy as np
 import pytest
 
-from ccr_ros.cli.grasp import body_from_text, parse_grip
+from ccr_ros.cli.grasp import parse_grip
+from ccr_ros.cli.grasp_arguments import body_from_text
 from ccr_ros.cli.main import main
 from ccr_ros.grasp.statics import GraspSolver, sphere_body
 from ccr_ros.model import Pose, load_gripper

@@ -17,60 +17,30 @@ from __future__ import annotations
 
 import argparse
 import json
-from typing import Any
 
 import numpy as np
 
+from ccr_ros.cli.grasp_arguments import add_body_arguments, body_from_args, gravity_from_args
 from ccr_ros.cli.grasp_report import Findings, report, to_dict
-from ccr_ros.cli.options import number
 from ccr_ros.cli.solve import parse_pull
-from ccr_ros.design.curve_text import object_from_text
 from ccr_ros.grasp.quality import compliance_of, payload_until_slip, quality_of
-from ccr_ros.grasp.statics import (
-    Body,
-    GraspSolver,
-    box_body,
-    cylinder_body,
-    mesh_body,
-    sphere_body,
-)
-from ccr_ros.model import ConvexMesh, InvalidValue, Pose, SolverSettings, UnknownName, load_gripper
+from ccr_ros.grasp.statics import GraspSolver
+from ccr_ros.model import InvalidValue, SolverSettings, UnknownName, load_gripper
 from ccr_ros.resources import find_config
 
 _TIME_LIMIT = 60.0  # s per solve; a person at a prompt waits longer than a control loop
-_STANDARD = 9.80665
-_DOWN = {  # gravity in the frame of a gripper that points so
-    "up": np.array([0.0, 0.0, -_STANDARD]),
-    "down": np.array([0.0, 0.0, _STANDARD]),
-    "sideways": np.array([-_STANDARD, 0.0, 0.0]),
-}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    need: Any = {"required": True}
-    parser.add_argument("gripper", metavar="GRIPPER", help="gripper file, or a name in config/")
-    parser.add_argument("--object", metavar="OBJECT", help="such as sphere:0.112", **need)
-    parser.add_argument(
-        "--center-height", metavar="M", help="of its centre above the bases [m]", **need
-    )
-    parser.add_argument("--mass", metavar="KG", default="0", help="of the object (default 0)")
-    parser.add_argument(
-        "--friction", metavar="MU", default="0", help="between it and the fingers (default 0)"
-    )
+    add_body_arguments(parser)
     parser.add_argument(
         "--pull",
         metavar="[[FINGER.]CABLE=]VALUE",
         action="append",
         help="3.2%% of the cable's rest length, or 0.0058 [m]: of every cable, of this cable of all"
         " fingers, or of one; later ones count",
-        **need,
-    )
-    parser.add_argument(
-        "--points",
-        choices=_DOWN,
-        default="up",
-        help="where the gripper points (default up); sideways: gravity is along its -x",
+        required=True,
     )
     parser.add_argument(
         "--until-slip",
@@ -82,14 +52,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Grasp and print; return the exit code."""
-    body = body_from_text(
-        args.object,
-        Pose(np.array([0.0, 0.0, number("--center-height", args.center_height, -10, 10)])),
-        number("--mass", args.mass, 0, 1e3),
-        number("--friction", args.friction, 0, 100),
-    )
+    body = body_from_args(args)
     gripper = load_gripper(find_config(args.gripper))
-    gravity = _DOWN[args.points]
+    gravity = gravity_from_args(args)
     solver = GraspSolver(gripper.fingers, body, SolverSettings(time_limit=_TIME_LIMIT), gravity)
     solution = solver.solve(parse_grip(args.pull, solver))
     if solution.converged:
@@ -105,25 +70,6 @@ def run(args: argparse.Namespace) -> int:
     findings = Findings(gripper.name, solution, held, quality, compliance, loads)
     print(json.dumps(to_dict(findings)) if args.json else report(findings))
     return 0 if held else 1
-
-
-def body_from_text(text: str, pose: Pose, mass: float, friction: float) -> Body:
-    """Return the body that a text names: see this module's help.
-
-    Raises:
-        InvalidValue, UnknownName: It is none.
-        InvalidFile, MissingPackage: A mesh cannot be read.
-    """
-    if text.startswith("mesh:"):
-        mesh = ConvexMesh.from_stl(text.removeprefix("mesh:"), 1e-3)
-        return mesh_body(mesh, mass, pose, friction)
-    sized = object_from_text(text)
-    if sized.kind == "sphere":
-        return sphere_body(sized.size[0], mass, pose, friction)
-    if sized.kind == "cylinder":
-        diameter, height = sized.size
-        return cylinder_body(diameter, height, mass, pose, friction)
-    return box_body(np.array(sized.size), mass, pose, friction)
 
 
 def parse_grip(words: list[str], solver: GraspSolver) -> dict[str, np.ndarray]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Find the finger, or the pulls, that reach a wanted shape.
+"""Find the finger, the pulls, or the gripper for what is wanted.
 
 A finger is a finger file or the name of one in config/ (helical, sphere_finger, ...).
 """
@@ -16,5 +16,9 @@ COMMANDS: dict[str, tuple[str, str]] = {
         "stiffness, Poisson's ratio and cable stretch from measurements",
     ),
     "gripper": ("ccr_ros.cli.design.gripper", "a whole gripper for an object"),
+    "turn": (
+        "ccr_ros.cli.design.turn",
+        "how far a gripper turns an object it holds",
+    ),
     "print": ("ccr_ros.cli.design.print", "a finger's parts as CSV and as a solid to print"),
 }

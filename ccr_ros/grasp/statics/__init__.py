@@ -2,6 +2,7 @@
 """Fingers and the object they hold in one equilibrium, free of ROS (docs/grasp_statics.md)."""
 
 from .body import Body, box_body, capsule_body, cylinder_body, mesh_body, sphere_body
+from .closing import close_with_forces, pressing
 from .result import GraspSolution, ObjectContact
 from .solver import GraspSolver
 
@@ -12,7 +13,9 @@ __all__ = [
     "ObjectContact",
     "box_body",
     "capsule_body",
+    "close_with_forces",
     "cylinder_body",
     "mesh_body",
+    "pressing",
     "sphere_body",
 ]
