@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -33,6 +33,14 @@ class Obstacle(ABC):
         for key, value in values.items():
             object.__setattr__(self, key, value)
 
+    def _carried(self, **values: np.ndarray) -> Self:
+        """Return a copy with what a rigid motion changes, which needs no checks anew."""
+        other = object.__new__(type(self))
+        for value in values.values():
+            value.setflags(write=False)
+        other.__dict__.update(self.__dict__, **values)
+        return other
+
     @abstractmethod
     def signed_distance(self, points: np.ndarray) -> np.ndarray:
         """Return the distance (P,) in metres of points (P, 3); positive outside."""
@@ -48,7 +56,7 @@ class Obstacle(ABC):
 
 def radial(offset: np.ndarray, span: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return normals and Hessians of |offset|, offset (P, 3) in what ``span`` projects on."""
-    r = np.linalg.norm(offset, axis=1)
+    r = np.sqrt(np.einsum("pi,pi->p", offset, offset))
     central = r < TINY
     r = np.maximum(r, TINY)
     normal = offset / r[:, None]

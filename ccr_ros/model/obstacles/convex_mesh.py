@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import copy
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,7 @@ import numpy as np
 
 from .. import checks
 from ..errors import InvalidValue
-from ..rotation import Pose, matrix_from_quaternion, quaternion_from_matrix
+from ..rotation import Pose, matrix_from_quaternion, quaternion_product
 from .base import FAR, Obstacle, default_edge_radius
 from .polytope import HalfSpaces, Polytope, convex_hull, polytope
 from .stl import read_stl
@@ -162,7 +161,6 @@ class ConvexMesh(Obstacle):
         return near.normals @ rotation.T, rotation @ near.hessians @ rotation.T
 
     def moved(self, pose: Pose) -> ConvexMesh:
-        turned = pose.rotation @ matrix_from_quaternion(self.orientation)
-        mesh = copy.copy(self)  # the polyhedron is the same in its own frame: it is kept
-        mesh._set(position=pose.points(self.position), orientation=quaternion_from_matrix(turned))
-        return mesh
+        # The polyhedron is the same in its own frame: it is kept.
+        turned = quaternion_product(pose.orientation, self.orientation)
+        return self._carried(position=pose.points(self.position), orientation=turned)

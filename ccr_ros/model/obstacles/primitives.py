@@ -3,14 +3,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import cast
 
 import numpy as np
 
 from .. import checks
-from ..rotation import Pose, matrix_from_quaternion, quaternion_from_matrix
+from ..rotation import Pose, matrix_from_quaternion, quaternion_product
 from .base import FAR, TINY, Obstacle, default_edge_radius, radial
+
+_EYE = np.eye(3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,13 +30,14 @@ class Sphere(Obstacle):
         )
 
     def signed_distance(self, points: np.ndarray) -> np.ndarray:
-        return np.linalg.norm(points - self.center, axis=1) - self.radius
+        offset = points - self.center
+        return np.sqrt(np.einsum("pi,pi->p", offset, offset)) - self.radius
 
     def derivatives(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return radial(points - self.center, np.eye(3))
+        return radial(points - self.center, _EYE)
 
     def moved(self, pose: Pose) -> Sphere:
-        return replace(self, center=pose.points(self.center))
+        return self._carried(center=pose.points(self.center))
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +67,7 @@ class Cylinder(Obstacle):
         return radial((points - self.point) @ across, across)
 
     def moved(self, pose: Pose) -> Cylinder:
-        return replace(self, point=pose.points(self.point), axis=pose.vectors(self.axis))
+        return self._carried(point=pose.points(self.point), axis=pose.vectors(self.axis))
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +91,7 @@ class Plane(Obstacle):
         return np.tile(self.normal, (len(points), 1)), np.zeros((len(points), 3, 3))
 
     def moved(self, pose: Pose) -> Plane:
-        return replace(self, point=pose.points(self.point), normal=pose.vectors(self.normal))
+        return self._carried(point=pose.points(self.point), normal=pose.vectors(self.normal))
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,7 +152,5 @@ class Box(Obstacle):
         return (sign * normal) @ rotation.T, rotation @ hessian @ rotation.T
 
     def moved(self, pose: Pose) -> Box:
-        turned = pose.rotation @ matrix_from_quaternion(self.orientation)
-        return replace(
-            self, center=pose.points(self.center), orientation=quaternion_from_matrix(turned)
-        )
+        turned = quaternion_product(pose.orientation, self.orientation)
+        return self._carried(center=pose.points(self.center), orientation=turned)

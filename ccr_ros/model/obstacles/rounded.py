@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import cast
 
 import numpy as np
@@ -66,7 +66,7 @@ class Capsule(Obstacle):
         return normals, hessians
 
     def moved(self, pose: Pose) -> Capsule:
-        return replace(self, start=pose.points(self.start), end=pose.points(self.end))
+        return self._carried(start=pose.points(self.start), end=pose.points(self.end))
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,4 +145,4 @@ class FiniteCylinder(Obstacle):
         return normals, hessians
 
     def moved(self, pose: Pose) -> FiniteCylinder:
-        return replace(self, center=pose.points(self.center), axis=pose.vectors(self.axis))
+        return self._carried(center=pose.points(self.center), axis=pose.vectors(self.axis))
