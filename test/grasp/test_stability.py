@@ -46,6 +46,9 @@ def test_a_bound_is_exceeded_if_the_eigenvalue_is_above_it(case):
     for change in (-0.1, -1e-4, 1e-4, 0.1):
         bound = value + change * abs(value)
         assert solution.stability.exceeds(bound) == (change < 0)
+    stability = solution.stability
+    decomposed, _ = stability._by_decomposition(stability._basis())
+    assert value == pytest.approx(decomposed, rel=1e-8)
     assert all(f.certificate.stable == solution.stable for f in solution.fingers)
     assert all(np.isnan(f.certificate.smallest_eigenvalue) for f in solution.fingers)
 

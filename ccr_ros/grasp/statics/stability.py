@@ -3,7 +3,8 @@
 
 That the smallest eigenvalue is above a bound is told without it: by Debreu's lemma, H is positive
 definite on the null space of the constraints' gradients A if and only if H + w A'A is for some w,
-which Cholesky's factorisation says, finger by finger (`newton`). The eigenvalue takes longer.
+which Cholesky's factorisation says, finger by finger (`newton`). The eigenvalue takes longer; where
+it is positive Lanczos' method finds it with that matrix's inverse.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from ccr_ros.model.result import row_space
 
 from .assembly import FingerBlock, GraspPoint, Hand
 from .body import Body
+from .lanczos import largest_pair
 
 STABLE = 1e-6  # a grasp with a smaller eigenvalue is at a branch point, or past it
 _AUGMENT = (1e3, 1e5)  # w, in turn, for gradients of unit length
@@ -85,52 +87,95 @@ class Stability:
 
     def _definite(self, bound: float, augment: float) -> bool:
         """Whether H - bound + augment A'A is positive definite."""
-        held = self._held
-        corner = augment * held.T @ held - bound * np.eye(6)
         try:
-            for weight, part in zip(self.hand.weights, self.at.blocks, strict=True):
-                rows, columns = _constraints(part)
-                size = np.einsum("ij,ij->i", rows, rows) + np.einsum("ij,ij->i", columns, columns)
-                raised = rows.T * (augment / np.maximum(size, 1e-12))
-                matrix = weight * part.point.hessian + raised @ rows
-                matrix.flat[:: len(matrix) + 1] -= bound
+            blocks, corner = self._augmented(augment, bound)
+            for matrix, border in blocks:
                 np.linalg.cholesky(matrix)
-                if self.supported:
-                    continue
-                border = weight * part.border + raised @ columns
-                corner += weight * part.corner
-                corner += (columns.T * (augment / np.maximum(size, 1e-12))) @ columns
-                corner -= border.T @ np.linalg.solve(matrix, border)
+                if not self.supported:
+                    corner = corner - border.T @ np.linalg.solve(matrix, border)
             np.linalg.cholesky(corner)
         except np.linalg.LinAlgError:
             return False
         return True
 
+    def _augmented(
+        self, augment: float, bound: float = 0.0
+    ) -> tuple[list[tuple[np.ndarray, np.ndarray]], np.ndarray]:
+        """H - bound + augment A'A: each finger's block and border, and the object's block."""
+        held = self._held
+        corner = augment * held.T @ held - bound * np.eye(6)
+        blocks = []
+        for weight, part in zip(self.hand.weights, self.at.blocks, strict=True):
+            rows, columns = _constraints(part)
+            size = np.einsum("ij,ij->i", rows, rows) + np.einsum("ij,ij->i", columns, columns)
+            raised = augment / np.maximum(size, 1e-12)
+            matrix = weight * part.point.hessian + (rows.T * raised) @ rows
+            matrix.flat[:: len(matrix) + 1] -= bound
+            blocks.append((matrix, weight * part.border + (rows.T * raised) @ columns))
+            corner = corner + weight * part.corner + (columns.T * raised) @ columns
+        return blocks, corner
+
     @cached_property
     def _softest(self) -> tuple[float, np.ndarray]:
         """The smallest eigenvalue and its vector (fingers, then q)."""
+        basis = self._basis()
+        for augment in _AUGMENT:
+            if self._definite(0.0, augment):
+                found = self._by_inverse(basis, augment)
+                if found is not None:
+                    return found
+        return self._by_decomposition(basis)
+
+    def _basis(self) -> np.ndarray:
+        """Orthonormal basis (total, r) of the constraints' gradients."""
         sizes = [problem.size for problem in self.hand.problems]
-        total = sum(sizes) + 6
-        matrix, rows = np.zeros((total, total)), []
-        first = 0
-        for weight, part, size in zip(self.hand.weights, self.at.blocks, sizes, strict=True):
-            own = slice(first, first + size)
-            matrix[own, own] = weight * part.point.hessian
-            matrix[own, -6:] = weight * part.border
-            matrix[-6:, own] = matrix[own, -6:].T
-            matrix[-6:, -6:] += weight * part.corner
+        total, first, rows = sum(sizes) + 6, 0, []
+        for part, size in zip(self.at.blocks, sizes, strict=True):
             by_y, by_q = _constraints(part)
             full = np.zeros((len(by_y), total))
-            full[:, own], full[:, -6:] = by_y, by_q
+            full[:, first : first + size], full[:, -6:] = by_y, by_q
             rows.append(full)
             first += size
         idle = np.zeros((len(self._held), total))
         idle[:, -6:] = self._held
         constraints = np.concatenate([*rows, idle])
-        if not len(constraints):
-            values, vectors = np.linalg.eigh(matrix)
-            return float(values[0]), vectors[:, 0]
-        basis = row_space(constraints)
+        return row_space(constraints) if len(constraints) else np.zeros((total, 0))
+
+    def _by_inverse(self, basis: np.ndarray, augment: float) -> tuple[float, np.ndarray] | None:
+        """The pair from the inverse of the reduced Hessian, of which it is the largest.
+
+        With M = H + augment A'A and Q a basis of A' that is M^-1 - M^-1 Q (Q'M^-1 Q)^-1 Q'M^-1.
+        """
+        blocks, corner = self._augmented(augment)
+        inverses = [np.linalg.inv(matrix) for matrix, _ in blocks]
+        reaches = [inverse @ border for inverse, (_, border) in zip(inverses, blocks, strict=True)]
+        for reach, (_, border) in zip(reaches, blocks, strict=True):
+            corner = corner - border.T @ reach
+        ends = np.cumsum([len(inverse) for inverse in inverses])[:-1]
+        by_q = np.linalg.inv(corner)
+
+        def solved(x: np.ndarray) -> np.ndarray:
+            parts = np.split(x[:-6], ends)
+            pull = x[-6:] - sum(r.T @ p for r, p in zip(reaches, parts, strict=True))
+            q = by_q @ pull
+            along = [i @ p - r @ q for i, p, r in zip(inverses, parts, reaches, strict=True)]
+            return np.concatenate([*along, q])
+
+        held = solved(basis)
+        back = held @ np.linalg.inv(basis.T @ held)
+        found = largest_pair(lambda x: solved(x) - back @ (held.T @ x), len(basis))
+        return None if found is None else (1.0 / found[0], found[1])
+
+    def _by_decomposition(self, basis: np.ndarray) -> tuple[float, np.ndarray]:
+        """The pair out of all of the reduced Hessian's, whatever their signs."""
+        matrix, first = np.zeros((len(basis), len(basis))), 0
+        for weight, part in zip(self.hand.weights, self.at.blocks, strict=True):
+            own = slice(first, first + len(part.border))
+            matrix[own, own] = weight * part.point.hessian
+            matrix[own, -6:] = weight * part.border
+            matrix[-6:, own] = matrix[own, -6:].T
+            matrix[-6:, -6:] += weight * part.corner
+            first += len(part.border)
         null = np.linalg.qr(basis, mode="complete")[0][:, basis.shape[1] :]
         values, vectors = np.linalg.eigh(null.T @ matrix @ null)
         return float(values[0]), null @ vectors[:, 0]
