@@ -2,7 +2,8 @@
 """Fingers, servos and a solver in a few lines, for the coordinator without ROS.
 
 A finger touches at a place and is a spring from there on; a servo follows with a lag; the solver
-answers one step later. Figures are those of the sphere gripper.
+answers one step later. Figures are those of the sphere gripper. While the object is moved it goes
+along with the fingers: x is as far as finger_1 has gone.
 """
 
 from __future__ import annotations
@@ -14,9 +15,14 @@ import numpy as np
 from ccr_ros.grasp.coordinator import GripperCoordinator
 from ccr_ros.grasp.finger_control import FingerControl, SolvedFinger
 from ccr_ros.grasp.free_motion import FreeMotion
+from ccr_ros.grasp.machine import State
+from ccr_ros.grasp.motion import HeldObject
+from ccr_ros.grasp.move_path import MovePath
+from ccr_ros.grasp.moves import move_goal
 from ccr_ros.grasp.pull_path import PullPath
 from ccr_ros.grasp.runs import grasp_goal, release_goal
 from ccr_ros.grasp.settings import GraspSettings
+from ccr_ros.model import Pose
 
 STEP = 0.02  # s
 LENGTH = 0.0062  # m
@@ -58,6 +64,23 @@ class Plant:
         self.stuck: set[str] = set()
         self.limp: set[str] = set()  # touch that no tension tells of
         self.history: list[dict[str, float]] = []  # commanded places
+        self.margin, self.held, self.lost_pose = 0.5, True, False  # what is told of the object
+        self.told = True
+        self.x = 0.0  # m
+        self.planner = self.plan  # None: no answer comes
+
+    def plan(self, run) -> MovePath | Exception:
+        """Plan that finger_1 goes by the shift in x, and the others half of it back."""
+        shift = float(run.goal.target.shift[0])
+        ways = (shift, -0.5 * shift, -0.5 * shift)
+        shares = np.linspace(0.0, 1.0, 5)
+        return MovePath(
+            {n: (self.at[n] + shares * way)[:, None] for n, way in zip(NAMES, ways, strict=True)}
+        )
+
+    def thing_now(self) -> HeldObject:
+        pose = Pose(np.array([self.x, 0.0, 0.11]))
+        return HeldObject(self.thing, pose, self.held, self.margin, self.lost_pose)
 
     def force(self, name: str) -> float:
         return max(0.0, STIFFNESS * (self.at[name] - self.touch[name]))
@@ -76,7 +99,11 @@ class Plant:
                 self.wanted[name] = finger.path.place(finger.command)
             if name not in self.stuck and not self.bridge_silent:
                 way = self.wanted[name] - self.at[name]
-                self.at[name] += way * -math.expm1(-self.seconds / self.lag)
+                way *= -math.expm1(-self.seconds / self.lag)
+                self.at[name] += way
+                if self.gripper.state is State.MOVING:
+                    self.touch[name] += way
+                    self.x += way if name == NAMES[0] else 0.0
             if not self.bridge_silent:
                 finger.hear_pulls(np.array([self.at[name]]), self.now)
             if self.steps % self.solve_every:
@@ -90,7 +117,11 @@ class Plant:
                 stale=name in self.stale,
                 stable=name not in self.unstable,
             )
+        if self.told and not self.solver_silent:
+            self.gripper.thing.hear(self.thing_now(), self.now)
         self.gripper.step(self.now)
+        if self.planner is not None and (run := self.gripper.plan_wanted) is not None:
+            self.gripper.take_plan(run, self.planner(run))
         self.history.append({name: finger.place for name, finger in self.control.items()})
 
     def run(self, seconds: float) -> None:
@@ -109,6 +140,10 @@ class Plant:
 
     def release(self, **values):
         return self.gripper.release(release_goal(**values), self.now)
+
+    def move(self, x: float = 2e-4, **values):
+        goal = move_goal(self.settings, shift=(x, 0.0, 0.0), **values)
+        return self.gripper.move(goal, self.now)
 
     def finish(self, run, seconds: float = 60.0):
         self.until(lambda: run.outcome is not None, seconds)

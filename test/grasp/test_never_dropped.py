@@ -11,9 +11,11 @@ from plant import LENGTH, NAMES, TOUCH, Plant
 
 from ccr_ros.grasp.machine import State
 from ccr_ros.grasp.runs import Refused
+from ccr_ros.model import CcrError
 
 ONE = st.sampled_from(NAMES)
 SHORT = st.sampled_from([0.3, 1.0])  # s
+KEEPING = (State.HOLDING, State.MOVING, State.STOPPED, State.FAULT, State.CLOSING)
 CHANGES = (-5e-4, -2e-4, 4e-4, 1.0)  # m, of the place of touch
 
 
@@ -21,7 +23,8 @@ class Person(RuleBasedStateMachine):
     """Commands and mishaps in any order, on simulated fingers.
 
     Once all fingers hold, no command may be below the place where its finger touched, until a
-    release begins.
+    release begins. While the object is moved these places go along with the commands, which are
+    the plan's and nothing else.
     """
 
     @initialize(held=st.booleans())
@@ -30,6 +33,9 @@ class Person(RuleBasedStateMachine):
         self.gripper = self.plant.gripper
         self.run = self.letting = None
         self.kept = None  # floors of what is held, by finger
+        self.moved = None  # those, and the places, when the motion began
+        self.planned = {}  # how far back and on the plan goes, by finger
+        self.plant.planner = self.plan
         self.wait(0.2)
 
     def wait(self, seconds):
@@ -37,6 +43,26 @@ class Person(RuleBasedStateMachine):
         while self.plant.now < end:
             self.plant.advance()
             self.check()
+
+    def plan(self, run):
+        path = self.plant.plan(run)
+        self.planned = {
+            name: (float(rows.min() - rows[0, 0]), float(rows.max() - rows[0, 0]))
+            for name, rows in path.pulls.items()
+        }
+        return path
+
+    def follow(self, places):
+        """The floors go with the object while it is moved."""
+        if self.moved is None:
+            self.moved = dict(self.kept), dict(places)
+            self.planned = {}
+        floors, begin = self.moved
+        for name, floor in floors.items():
+            back, on = self.planned.get(name, (0.0, 0.0))
+            assert back - 1e-9 <= places[name] - begin[name] <= on + 1e-9
+            gone = min(places[name], self.plant.wanted[name]) - begin[name]
+            self.kept[name] = floor + gone
 
     def check(self):
         state, grip = self.gripper.state, self.gripper.grip
@@ -48,8 +74,12 @@ class Person(RuleBasedStateMachine):
             self.kept = {
                 name: min(self.plant.wanted[name], grip.floors[name]) for name in grip.targets
             }
+        if state is State.MOVING:
+            self.follow(places)
+        else:
+            self.moved = None
         if self.kept is not None:
-            assert state in (State.HOLDING, State.STOPPED, State.FAULT, State.CLOSING), state
+            assert state in KEEPING, state
             for name, floor in self.kept.items():
                 assert min(places[name], self.plant.wanted[name]) >= floor - 1e-12
         for name in NAMES:
@@ -62,6 +92,34 @@ class Person(RuleBasedStateMachine):
         except Refused as refused:
             assert self.gripper.refusal == str(refused)
         self.check()
+
+    @rule(x=st.sampled_from([-3e-4, 1e-4, 3e-4]), planned=st.sampled_from(["", "no", "never"]))
+    def move(self, x, planned):
+        """Ask for a motion, which is planned, refused, or never answered."""
+        answers = {"": self.plan, "no": lambda run: CcrError("no"), "never": None}
+        self.plant.planner = answers[planned]
+        try:
+            self.run = self.plant.move(x)
+        except Refused as refused:
+            assert self.gripper.refusal == str(refused)
+        self.check()
+
+    @rule(margin=st.sampled_from([0.5, 0.0]), held=st.booleans(), lost=st.booleans())
+    def object_is_told_of(self, margin, held, lost):
+        self.plant.margin, self.plant.held, self.plant.lost_pose = margin, held, lost
+        self.wait(0.3)
+        self.plant.margin, self.plant.held, self.plant.lost_pose = 0.5, True, False
+
+    @rule(x=st.sampled_from([-3e-4, 3e-4]), how=st.sampled_from(["stop", "hold", "cancel", "wait"]))
+    def move_for_a_while(self, x, how):
+        """As people do most: what is held is moved, and somebody changes his mind on the way."""
+        self.grasp_to_the_end(0.3)
+        self.move(x, "")
+        self.wait(0.6)
+        if how == "wait":
+            self.wait(2.0)
+        else:
+            getattr(self, how)()
 
     @rule(delay=st.sampled_from([0.0, 0.5, 2.0]), fast=st.booleans())
     def release(self, delay, fast):
