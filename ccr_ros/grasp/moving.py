@@ -157,7 +157,8 @@ class Moving:
             self._way = min(self._way + speed * seconds, path.length)
             self._command(path.at(self._way))
         if self._way < path.length and now - self._followed_at > settings.stall_time:
-            text = f"the fingers do not follow within {settings.move_lead * 1e3:g} mm"
+            behind = max(self._fingers, key=lambda name: self._behind(path, name))
+            text = f"{behind} does not follow within {settings.move_lead * 1e3:g} mm"
             return _ended(f"stopped: {text}", text)
         if self._way >= path.length and self._settled(now) and thing is not None:
             return self._at_the_end(path)
@@ -196,13 +197,14 @@ class Moving:
 
     def _followed(self, path: MovePath) -> bool:
         """Tell whether the poses are near enough to where the plan is to go on."""
-        wanted = path.at(self._way)
-        return all(
-            finger.solved is not None
-            and not finger.solved.stale
-            and _far(wanted[name], finger.solved.pulls) <= self._settings.move_lead
-            for name, finger in self._fingers.items()
-        )
+        return all(self._behind(path, name) <= self._settings.move_lead for name in self._fingers)
+
+    def _behind(self, path: MovePath, name: str) -> float:
+        """How far a finger's newest pose is from where the plan is [m]; infinity: not known."""
+        solved = self._fingers[name].solved
+        if solved is None or solved.stale:
+            return math.inf
+        return _far(path.at(self._way)[name], solved.pulls)
 
     def _at_the_end(self, path: MovePath) -> Verdict:
         assert self._start is not None
