@@ -30,6 +30,9 @@ _FAR = 0.2  # of the length, that it may
 _LOOSE = 0.1  # stiffness from which on an equilibrium without support is tried
 _PATIENCE = 10  # Newton steps without a smaller error than any before, until that is given up
 _TORN = 2e-3  # share of a Newton step; one that would go as far twice has nothing to hold on to
+# A step in which the object goes farther than this (of the length; rad), and than this per change
+# of a pull (of L / disk radius), has left the equilibrium that it should follow.
+_LEAP, _LEAP_TURN, _LEAP_GAIN = 0.02, 0.5, 3.0
 _LOAD_STEP = 0.1  # of the forces that press on the object, where there is friction
 
 
@@ -126,7 +129,10 @@ class Path:
                 found = self._newton(way, self._sticking(way.point), pulls, next_load)
             # What comes to touch has no friction in the step in which it does.
             skipped = found is not None and rough and size > 2 * fine and self._touches(found)
-            if found is None or skipped:
+            leapt = (
+                found is not None and stood is None and self._leaps(way.point, found, size * change)
+            )
+            if found is None or skipped or leapt:
                 size = 0.5 * (share - done)
                 way.late = time.thread_time() > self._deadline
                 if size < smallest or way.late:
@@ -175,6 +181,13 @@ class Path:
 
     def _blocks(self, at: GraspPoint) -> Sequence[tuple[float, FingerBlock]]:
         return list(zip(self.hand.weights, at.blocks, strict=True))
+
+    def _leaps(self, start: GraspPoint, end: GraspPoint, change: float) -> bool:
+        """Whether the object goes out of proportion to a change of pulls, as a share of L."""
+        gain = max(m.finger.length / m.finger.disk_radius for m in self.hand.mounted)
+        shift = float(np.linalg.norm(end.pose.position - start.pose.position)) / self.hand.length
+        turn = float(np.linalg.norm(turn_between(start.pose, end.pose)))
+        return shift > _LEAP + _LEAP_GAIN * gain * change or turn > _LEAP_TURN
 
     def _touches(self, at: GraspPoint) -> bool:
         return any(bool((part.point.forces[-1] > ACTIVE).any()) for part in at.blocks)
