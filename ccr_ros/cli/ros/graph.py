@@ -54,8 +54,10 @@ def graph_node(
     from rclpy.exceptions import NameValidationException
     from rclpy.parameter import Parameter
     from rclpy.signals import SignalHandlerOptions
+    from rclpy.validate_node_name import validate_node_name
 
     try:
+        validate_node_name(name or NODE_PREFIX)  # a node that fails to be made prints warnings
         handled = SignalHandlerOptions.ALL if signals else SignalHandlerOptions.NO
         rclpy.init(args=[], signal_handler_options=handled)
         node = rclpy.create_node(
