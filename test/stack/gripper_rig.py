@@ -29,9 +29,9 @@ LIMIT = 120.0  # s; far beyond what anything takes
 class Rig:
     """Starts the nodes of one gripper, hears what they say, asks them to do things."""
 
-    def __init__(self, children, folder, context, namespace, patience):
+    def __init__(self, children, folder, context, namespace, patience, rate):
         self.namespace = namespace
-        self._patience = patience
+        self._patience, self._rate = patience, rate
         self._children, self._folder = children, folder
         self._running = {}
         self.context = context
@@ -68,7 +68,7 @@ class Rig:
             own = {
                 "calibration_file": str(self._folder / "zeros.yaml"),
                 "loopback.state_file": str(self._folder / "angles.yaml"),
-                "rate": 20.0,  # each of its cycles is three poses to solve
+                "rate": self._rate,  # each of its cycles is three poses to solve
             }
         elif name == "gripper_coordinator_node" and self._patience:
             timeouts = ("solver_timeout", "bridge_timeout", "stale_timeout")
@@ -170,11 +170,12 @@ class Rig:
 
 
 @contextmanager
-def rigs(folder, *namespaces, patience=10.0):
+def rigs(folder, *namespaces, patience=10.0, rate=20.0):
     """Give a started gripper for each namespace; all of them end with the block.
 
     patience: silence of others that the coordinator bears [s], as the machine may be busy; None:
     its default.
+    rate: cycles of the servo bridge per second.
     """
     context = rclpy.Context()
     rclpy.init(args=[], context=context)
@@ -186,7 +187,7 @@ def rigs(folder, *namespaces, patience=10.0):
                 place = folder / namespace.strip("/")
                 place.mkdir()
                 children = stack.enter_context(Children(place, environ))
-                made.append(Rig(children, place, context, namespace, patience))
+                made.append(Rig(children, place, context, namespace, patience, rate))
                 for name in (*NODES, BALL_NODE.name):
                     made[-1].start(name)
             for rig in made:

@@ -129,7 +129,7 @@ def comes_back(rig):
 
 
 def test_two_grippers_at_once(tmp_path):
-    with rigs(tmp_path, "/left", "/right") as (left, right):
+    with rigs(tmp_path, "/left", "/right", rate=8.0) as (left, right):
         left.until(lambda: len(left.pulls) == 3, "measured pulls")
         before = left.measured()
         right.grasp(0.3)
