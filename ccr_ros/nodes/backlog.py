@@ -3,9 +3,12 @@
 
 from __future__ import annotations
 
+import math
 import time
 
-_MOST_LOOKING = 0.005  # s that taking in a backlog may delay a solve by
+# s that taking in a backlog may delay a solve by: at least, and at most. Between them it is what
+# the solve before took: where solves take long, more messages wait, and would be more each time.
+_LOOKING, _MOST_LOOKING = 0.005, 0.1
 
 
 class Backlog:
@@ -18,6 +21,8 @@ class Backlog:
         self.growing = False  # whether the last look found newer messages
         self._seen = 0
         self._since: float | None = None  # when it was first looked at
+        self._settled_at = -math.inf
+        self._limit = _LOOKING
 
     def settled(self, received: int) -> bool:
         """Tell whether no more have come in, or it was looked at for long enough.
@@ -31,8 +36,9 @@ class Backlog:
         now = time.monotonic()
         if self._since is None:
             self._since = now
-        if quiet or now - self._since > _MOST_LOOKING:
-            self._since = None
+            self._limit = min(max(now - self._settled_at, _LOOKING), _MOST_LOOKING)
+        if quiet or now - self._since > self._limit:
+            self._since, self._settled_at = None, now
         return self._since is None
 
     def mark_seen(self, received: int) -> None:

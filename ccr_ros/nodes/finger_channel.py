@@ -83,7 +83,8 @@ class FingerChannel:
         self._pose_stamp = now
         self.accepted = self._wanted  # the last that the solver took
         self._refusal = ""  # why the newest message was refused
-        self._unsolved = True  # whether there is something to solve
+        self._unsolved = True  # whether there is something to solve, or to show again
+        self._anew = True  # whether to solve even the pulls that are shown
         self._waiting = False  # whether _wanted came as a message and is not solved yet
         self._dropped_told = 0
         self._backlog = Backlog()
@@ -104,8 +105,15 @@ class FingerChannel:
 
     @property
     def unsolved(self) -> bool:
-        """Whether there is something to solve."""
+        """Whether there is something to solve, or to show again."""
         return self._unsolved
+
+    @property
+    def shown(self) -> bool:
+        """Whether the pose is that of the wanted pulls already, and nothing else is due."""
+        if self._anew or self.fault or self.solution is None:
+            return False
+        return bool(np.all(np.abs(self._wanted.pulls - self.solution.pulls) <= _SAME))
 
     def set_obstacles(self, obstacles: Sequence[Obstacle]) -> None:
         """Replace all obstacles, given in the finger's base frame; nothing is solved yet.
@@ -117,16 +125,23 @@ class FingerChannel:
 
     def solve_again(self, stamp: TimeMessage) -> None:
         """Ask for a new solve of the wanted pulls, because the obstacles are new at this time."""
-        if not self._waiting:
+        if not self._waiting or self.shown:
             self._wanted = Task(self._wanted.pulls, stamp)
-        self._unsolved = True
+        self._unsolved = self._anew = True
 
     def settled(self) -> bool:
         """Tell whether no newer pulls have come in since the last look, which this one becomes."""
         return self._backlog.settled(self.received)
 
-    def solve(self) -> None:
-        """Solve the wanted pulls and publish: the new pose, or the last good one as stale."""
+    def solve(self) -> bool:
+        """Solve the wanted pulls and publish: the new pose, or the last good one as stale.
+
+        Pulls that are shown already, as those of a gripper that holds, are not solved but shown
+        again, with their own stamp; return whether it was a solve.
+        """
+        if self.shown:
+            self.show_again()
+            return False
         task = self.begin()
         solution = self.solver.solve(task.pulls)
         self.solve_times.append(solution.certificate.solve_time)
@@ -134,10 +149,19 @@ class FingerChannel:
             self.show(task, solution)
         else:
             self.fail(task, solution.certificate.message)
+        return True
+
+    def show_again(self) -> None:
+        """Publish the pose for the wanted pulls, which are its own; see `shown`."""
+        assert self.solution is not None
+        self._unsolved = self._waiting = False
+        self.accepted, self._pose_stamp = self._wanted, self._wanted.stamp
+        self._publish_pose(self.solution)
+        self._publish_state()
 
     def begin(self) -> Task:
         """Take the wanted pulls to solve them; `show` or `fail` comes next."""
-        self._unsolved = self._waiting = False
+        self._unsolved = self._anew = self._waiting = False
         self._warn_of_backlog()
         self.solves += 1
         return self._wanted
@@ -170,9 +194,6 @@ class FingerChannel:
             self._refuse(error)
             return
         stamp = self._stamp(message.header.stamp)
-        if self.solution is not None and self._shows(self.solution, pulls):
-            self._show_again(self.solution, Task(pulls, stamp))
-            return
         if self._waiting:
             self.dropped += 1
         elif not self._backlog.growing:
@@ -181,20 +202,6 @@ class FingerChannel:
         self._wanted = Task(pulls, stamp)
         self._unsolved = self._waiting = True
         self._wake()
-
-    def _shows(self, solution: Solution, pulls: np.ndarray) -> bool:
-        """Tell whether the pose is that of these pulls already, and nothing else is due."""
-        if self._unsolved or self.fault:
-            return False
-        return bool(np.all(np.abs(pulls - solution.pulls) <= _SAME))
-
-    def _show_again(self, solution: Solution, task: Task) -> None:
-        """Publish the pose for newer pulls that are the same, as those of a gripper that holds."""
-        self._backlog.mark_seen(self.received)
-        self.accepted, self._pose_stamp = task, task.stamp
-        self._publish_pose(solution)
-        self._publish_state()
-        self._wake()  # the object's state, too, is as new as they are
 
     def _refuse(self, error: CcrError) -> None:
         self.refused += 1

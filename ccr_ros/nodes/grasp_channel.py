@@ -214,11 +214,18 @@ class GraspChannel:
     # The worker
 
     def turn(self) -> bool:
-        """Solve the newest pulls of all fingers, once all have come in; return whether it did."""
+        """Solve the newest pulls of all fingers, once all have come in; return whether it did.
+
+        Pulls that are shown already are shown again.
+        """
         due = any(channel.unsolved for channel in self._fingers)
         if due and self._backlog.settled(sum(c.received for c in self._fingers)):
-            self._solve()
-            return True
+            if not all(channel.shown for channel in self._fingers):
+                self._solve()
+                return True
+            for channel in self._fingers:
+                if channel.unsolved:
+                    channel.show_again()
         return False
 
     def _solve(self) -> None:

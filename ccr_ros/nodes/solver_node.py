@@ -145,8 +145,8 @@ class SolverNode(Node):
                 return  # it keeps its place: its newest pulls come in with the next turns
             self._channels.rotate(-1)  # fair: who was first is last next time
             if channel.unsolved:
-                channel.solve()
-                self._scene_changed()
+                if channel.solve():
+                    self._scene_changed()
                 return
 
     # Objects
