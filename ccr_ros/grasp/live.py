@@ -113,7 +113,8 @@ class LiveGrasp:
         place = self.place(pose, held)
         stands = self._solver.supported or not held
         if stands and not (self._solver.supported and place is self._solver.body.pose):
-            self._solver.support(place)
+            # Where it is: the fingers stay as they are, with all their friction.
+            self._solver.support(None if place is self._solver.body.pose else place)
             due = True
         self._said, self._mass, self._wanted = pose, mass, held
         self._to_let_go = held and self._solver.supported

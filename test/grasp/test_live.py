@@ -87,6 +87,21 @@ def test_put_down_it_stays_where_it_is_unless_another_pose_is_said(live):
     assert height(live) == 0.108
 
 
+def test_put_down_with_friction_no_finger_slips(fingers):
+    body = sphere_body(0.112, LIGHT, PLACE, friction=0.5)
+    live = LiveGrasp(fingers, body, SolverSettings(time_limit=20.0), UPWARDS)
+    pull(live, SHUT)
+    live.want(PLACE, LIGHT, True)
+    held = pull(live, SHUT)
+    assert live.held
+    live.want(PLACE, LIGHT, False)
+    stands = pull(live, SHUT)
+    assert live.supported and len(stands.contacts) == len(held.contacts)
+    for before, after in zip(held.contacts, stands.contacts, strict=True):
+        np.testing.assert_allclose(after.force, before.force, rtol=1e-4)
+        np.testing.assert_allclose(after.friction_force, before.friction_force, atol=1e-5)
+
+
 def test_a_pose_that_is_said_of_a_held_object_counts_for_nothing(live):
     live.want(PLACE, LIGHT, True)
     pull(live, SHUT)
