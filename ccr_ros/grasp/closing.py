@@ -61,7 +61,7 @@ class Closing:
 
     @property
     def target(self) -> float:
-        """Force that the fingers that touch are regulated to now [N]."""
+        """Level that the fingers that touch are regulated to now [N]; see `Grip.level`."""
         return self._target
 
     def limit(self, finger: FingerControl) -> float:
@@ -79,7 +79,7 @@ class Closing:
         if self.phase == APPROACH and self._all_touch():
             self.phase = PRESS
             if self._grip.committed:  # what was held before is not pressed less now
-                least = min(self._grip.force(finger) for finger in self._grip.needed)
+                least = min(self._grip.level(finger) for finger in self._grip.needed)
                 self._target = min(self._goal.force, max(self._target, least))
         if self.phase == PRESS:
             self._raise_target(seconds)
@@ -106,7 +106,7 @@ class Closing:
         # What was held before must not be pressed less while others still come.
         target = self._target
         if self._grip.committed:
-            target = max(target, self._grip.force(finger))
+            target = max(target, self._grip.level(finger))
         self._grip.regulate(finger, target)
 
     def _speed(self, finger: FingerControl) -> float:
@@ -117,13 +117,13 @@ class Closing:
         return goal.speed
 
     def _raise_target(self, seconds: float) -> None:
-        forces = [self._grip.force(f) for f in self._grip.needed if not self._at_limit(f)]
-        ahead = max(forces, default=0.0) > self._target + self._settings.force_tolerance
+        levels = [self._grip.level(f) for f in self._grip.needed if not self._at_limit(f)]
+        ahead = max(levels, default=0.0) > self._target + self._settings.force_tolerance
         if ahead and not self._grip.committed:
             return  # who ran on while it touched comes back first
         target = self._target + self._settings.press_rate * seconds
-        if forces:
-            target = min(target, max(self._target, min(forces) + _PRESS_LEAD))
+        if levels:
+            target = min(target, max(self._target, min(levels) + _PRESS_LEAD))
         self._target = min(target, self._goal.force)
 
     # How it ends
@@ -149,11 +149,11 @@ class Closing:
         return None
 
     def _pressed(self, finger: FingerControl) -> bool:
-        force, tolerance = self._grip.force(finger), self._settings.force_tolerance
+        level, tolerance = self._grip.level(finger), self._settings.force_tolerance
         at_floor = finger.place <= self._grip.floors.get(finger.name, -math.inf)
         kept = self._grip.committed or at_floor
         most = math.inf if kept else self._goal.force + tolerance
-        return self._grip.known(finger) and self._goal.force - tolerance <= force <= most
+        return self._grip.known(finger) and self._goal.force - tolerance <= level <= most
 
     def _verdict(self, now: float) -> Verdict | None:
         needed, settings = self._grip.needed, self._settings

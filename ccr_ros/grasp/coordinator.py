@@ -276,7 +276,8 @@ class GripperCoordinator(GripperBase):
 
     def _hold_on(self, now: float) -> None:
         self._keeper.step()
-        if lost := self.grip.hold(now):
+        carried = self.thing.fresh is not None
+        if lost := self.grip.hold(now, carried):
             reason = f"{lost} lost the object"
             self._runs.end_all(reason)
             self._freeze(Event.FAIL, reason)
@@ -284,10 +285,8 @@ class GripperCoordinator(GripperBase):
         run = self._runs.grasp
         if run is None:
             return
-        tolerance = self.settings.force_tolerance
-        near = all(
-            abs(self.grip.force(f) - self.target_force) <= tolerance and self.grip.known(f)
-            for f in self.grip.needed
+        near = self.grip.miss(carried) <= self.settings.force_tolerance and all(
+            self.grip.known(finger) for finger in self.grip.needed
         )
         if self._pressed.holds(near and self.grip.complete, now, self.settings.settle_time):
             self._runs.end_grasp(Outcome(End.DONE, "held with the new force", reached=True))

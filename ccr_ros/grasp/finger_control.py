@@ -45,6 +45,7 @@ class FingerControl:
         free: Its motion while it touches nothing.
         pull_range: Lowest and highest pull (m, 2) [m] while an object is moved; None: those of the
             path's two ends.
+        force_share: Times the force asked for that it presses with; see `Grip.level`.
     """
 
     def __init__(
@@ -54,6 +55,7 @@ class FingerControl:
         path: PullPath,
         free: FreeMotion,
         pull_range: np.ndarray | None = None,
+        force_share: float = 1.0,
     ) -> None:
         self.name = name
         self.cables = cables
@@ -61,6 +63,7 @@ class FingerControl:
         self.free = free
         ends = np.column_stack([path.open, path.closed])
         self.pull_range = np.sort(ends, axis=1) if pull_range is None else pull_range
+        self.force_share = force_share
 
         self.measured: np.ndarray | None = None  # pulls (m,) [m]
         self.measured_at = -math.inf  # s

@@ -32,9 +32,9 @@ class Grip:
         self.committed = False
         self.thing = ""
         self.required: tuple[str, ...] = tuple(fingers)
-        self.targets: dict[str, float] = {}  # [N] of the fingers whose force is regulated
+        self.targets: dict[str, float] = {}  # levels [N] of the fingers that are regulated
         self.floors: dict[str, float] = {}  # [m]
-        self.extra = 0.0  # N beyond the targets; see `MarginKeeper`
+        self.extra = 0.0  # N of level beyond the targets; see `MarginKeeper`
         self._lost = {name: Lasting() for name in fingers}
         self._regulated: dict[str, float] = {}  # time of the pose that was last acted on, by finger
 
@@ -52,6 +52,32 @@ class Grip:
     def force(self, finger: FingerControl) -> float:
         """Return a finger's force on the object [N]."""
         return finger.force(self.thing)
+
+    def level(self, finger: FingerControl) -> float:
+        """Return a finger's force per share [N], which is the same of all in an even grip.
+
+        A thumb presses against two fingers, and so with twice the force of each: its share is 2.
+        """
+        return self.force(finger) / finger.force_share
+
+    def mean(self) -> tuple[float, float]:
+        """Return level and target [N] of all fingers that hold, as if they were one."""
+        fingers = [self._fingers[name] for name in self.targets]
+        shares = sum(finger.force_share for finger in fingers)
+        if not fingers:
+            return 0.0, 0.0
+        level = sum(self.force(finger) for finger in fingers) / shares
+        target = sum(self.targets[f.name] * f.force_share for f in fingers) / shares
+        return level, target + self.extra
+
+    def miss(self, carried: bool) -> float:
+        """Return how far what is regulated is from its target [N]; see `hold`."""
+        if carried:
+            level, target = self.mean()
+            return abs(level - target)
+        targets = self.targets.items()
+        levels = {name: self.level(self._fingers[name]) for name in self.targets}
+        return max((abs(levels[n] - t - self.extra) for n, t in targets), default=0.0)
 
     def touches(self, finger: FingerControl) -> bool:
         """Tell whether a finger touches the object."""
@@ -96,10 +122,10 @@ class Grip:
         self.floors[finger.name] = place
 
     def commit(self, force: float | None) -> None:
-        """Hold from now on: with this target [N], or each finger with the force it has."""
+        """Hold from now on: with this target level [N], or each finger with the force it has."""
         for finger in self._fingers.values():
             if self.touches(finger) or finger.name in self.required:
-                as_it_is = max(self.force(finger) - self.extra, 0.0)
+                as_it_is = max(self.level(finger) - self.extra, 0.0)
                 self.targets[finger.name] = as_it_is if force is None else force
                 floor = self.floors.get(finger.name, finger.place)
                 self.floors[finger.name] = min(floor, finger.place)
@@ -107,32 +133,68 @@ class Grip:
         self._lost = {name: Lasting() for name in self._fingers}
 
     def regulate(self, finger: FingerControl, target: float) -> None:
-        """Move a finger's command, once for each new pose, so that its force nears a target.
+        """Move a finger's command, once for each new pose, so that its level nears a target.
 
         Not at a pose that is stale. At one that is not stable no farther; before a grip is
         committed back as far as the law wants, then only down to the floor. Never farther from
         the newest pose than ``blind_lead``, so that a slow solver makes no force swing.
         """
-        before = self._regulated.get(finger.name, -math.inf)
-        seconds = min(finger.solved_at - before, _LONGEST_REGULATION)
+        seconds = self._new_for(finger)
         self._regulated[finger.name] = finger.solved_at
-        solved, settings = finger.solved, self._settings
-        if solved is None or solved.stale or seconds <= 0.0:
+        if seconds > 0.0:
+            step = self.law.step(self.level(finger), target, seconds)
+            low, high = self._reach(finger)
+            finger.place = min(max(finger.place + step, low), high)
+
+    def regulate_together(self) -> None:
+        """Move the commands of all that hold by the same, so that their mean level nears a target.
+
+        Fingers that alone carry an object balance each other: their forces are not independent,
+        and fingers of which each went after its own would push the object away, without end. What
+        one of them may not do, none does.
+        """
+        fingers = [self._fingers[name] for name in self.targets]
+        seconds = min((self._new_for(finger) for finger in fingers), default=0.0)
+        if seconds <= 0.0:
             return
-        step = self.law.step(self.force(finger), target, seconds)
-        high = min(finger.limit, finger.solved_place + settings.blind_lead)
-        low = finger.solved_place - settings.blind_lead
-        if not solved.stable:
+        self._regulated |= {finger.name: finger.solved_at for finger in fingers}
+        level, target = self.mean()
+        step = self.law.step(level, target, seconds)
+        for finger in fingers:
+            low, high = self._reach(finger)
+            step = min(max(step, low - finger.place), high - finger.place)
+        for finger in fingers:
+            finger.place += step
+
+    def _new_for(self, finger: FingerControl) -> float:
+        """Return the time that the newest pose counts for [s]; 0: it is stale, or was acted on."""
+        if finger.solved is None or finger.solved.stale:
+            return 0.0
+        before = self._regulated.get(finger.name, -math.inf)
+        return min(finger.solved_at - before, _LONGEST_REGULATION)
+
+    def _reach(self, finger: FingerControl) -> tuple[float, float]:
+        """Return the least and the farthest place that the regulation may send a finger to [m]."""
+        lead = self._settings.blind_lead
+        low, high = finger.solved_place - lead, min(finger.limit, finger.solved_place + lead)
+        if finger.solved is None or not finger.solved.stable:
             high = finger.place
         if self.committed:
             low = max(low, self.floors.get(finger.name, finger.place))
-        low, high = min(max(low, 0.0), finger.place), max(high, finger.place)
-        finger.place = min(max(finger.place + step, low), high)
+        return min(max(low, 0.0), finger.place), max(high, finger.place)
 
-    def hold(self, now: float) -> str:
-        """Regulate all that hold; return the name of a required finger that lost touch, if any."""
-        for name, target in self.targets.items():
-            self.regulate(self._fingers[name], target + self.extra)
+    def hold(self, now: float, carried: bool = False) -> str:
+        """Regulate all that hold; return the name of a required finger that lost touch, if any.
+
+        Args:
+            now: Time [s].
+            carried: Whether the fingers alone carry the object.
+        """
+        if carried:
+            self.regulate_together()
+        else:
+            for name, target in self.targets.items():
+                self.regulate(self._fingers[name], target + self.extra)
         return self.lost(now)
 
     def lost(self, now: float) -> str:

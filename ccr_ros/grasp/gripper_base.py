@@ -72,17 +72,18 @@ class GripperBase:
         """Force that a finger is regulated to [N]; 0: it is not."""
         if self.state is State.HOLDING:
             target = self.grip.targets.get(finger.name, 0.0)
-            return target + self.grip.extra if target > 0.0 else 0.0
+            return (target + self.grip.extra) * finger.force_share if target > 0.0 else 0.0
         if self._closing is not None and self.state is State.CLOSING and self.grip.touches(finger):
-            return self._closing.target
+            return self._closing.target * finger.force_share
         return 0.0
 
     @property
     def target_force(self) -> float:
-        """Target of the grasp that is under way or holds [N]; 0: none."""
+        """Target level of the grasp that is under way or holds [N]; 0: none."""
         if self._runs.grasp is not None:
             return self._runs.grasp.goal.force + self.grip.extra
-        return max((self.target(f) for f in self.fingers.values()), default=0.0)
+        fingers = self.fingers.values()
+        return max((self.target(f) / f.force_share for f in fingers), default=0.0)
 
     def release_in(self, now: float) -> float:
         """Return the time until a waiting release begins [s]; negative: none waits."""

@@ -52,10 +52,6 @@ class MarginKeeper:
             grip.extra = min(max(grip.extra + rate * seconds, 0.0), max(most, 0.0))
 
     def _pressed(self) -> bool:
-        """Tell whether every finger presses as hard as it is asked to."""
-        grip, tolerance = self._grip, self._settings.force_tolerance
-        return all(
-            grip.force(f) >= grip.targets[f.name] + grip.extra - tolerance
-            for f in grip.needed
-            if f.name in grip.targets
-        )
+        """Tell whether the fingers press as hard as they are asked to."""
+        level, target = self._grip.mean()
+        return level >= target - self._settings.force_tolerance

@@ -50,7 +50,7 @@ class GraspGoal:
     """A grasp, complete: no value is left to a default.
 
     Attributes:
-        force: Of each finger [N].
+        force: Of each finger whose force share is 1 [N].
         speed: Of the pulls while closing [m/s].
         timeout: For all of it [s].
         required: Names of the fingers that must touch.

@@ -30,6 +30,7 @@ class GripperParameters:
         settings: Speeds, forces and times.
         paths: Of the fingers' pulls, in the gripper's order.
         ranges: Lowest and highest pull (m, 2) [m] of each finger while an object is moved.
+        shares: Times the target force that each finger presses with.
         control_rate: Steps per second [Hz].
         state_rate: GripperState and feedback messages per second [Hz].
     """
@@ -38,6 +39,7 @@ class GripperParameters:
     settings: GraspSettings
     paths: tuple[PullPath, ...]
     ranges: tuple[np.ndarray, ...]
+    shares: tuple[float, ...]
     control_rate: float
     state_rate: float
 
@@ -54,9 +56,10 @@ class GripperParameters:
                 path,
                 free_motion(mounted, path),
                 pulls,
+                share,
             )
-            for mounted, path, pulls in zip(
-                self.gripper.fingers, self.paths, self.ranges, strict=True
+            for mounted, path, pulls, share in zip(
+                self.gripper.fingers, self.paths, self.ranges, self.shares, strict=True
             )
         ]
 
@@ -98,8 +101,17 @@ def declare(node: Node) -> GripperParameters:
         _range(node, mounted.finger, path)
         for mounted, path in zip(gripper.fingers, paths, strict=True)
     )
+    shares = tuple(
+        parameters.fixed(
+            f"{name}.force_share",
+            1.0,
+            "Times the target force that this finger presses with: 2 for a thumb against two.",
+            (0.01, 100.0),
+        )
+        for name in gripper.finger_names
+    )
     settings = GraspSettings(**values)
-    return GripperParameters(gripper, settings, paths, ranges, control_rate, state_rate)
+    return GripperParameters(gripper, settings, paths, ranges, shares, control_rate, state_rate)
 
 
 def _path(node: Node, finger: Finger) -> PullPath:

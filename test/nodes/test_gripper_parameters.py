@@ -29,10 +29,16 @@ def test_every_parameter_is_described_and_fixed(start_coordinator, probe):
 
 @pytest.mark.parametrize(
     ("name", "value"),
-    [("close_speed", 0.0), ("max_force", -1.0), ("control_rate", 1e6), ("force_gain", "high")],
+    [
+        ("close_speed", 0.0),
+        ("max_force", -1.0),
+        ("control_rate", 1e6),
+        ("force_gain", "high"),
+        ("finger_1__force_share", 0.0),
+    ],
 )
 def test_out_of_range(start_coordinator, name, value):
-    with pytest.raises(ParameterException, match=name):
+    with pytest.raises(ParameterException, match=name.replace("__", ".")):
         start_coordinator(**{name: value})
 
 
