@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The paper's gripper at work: three pre-bent fingers close on a ball of 112 mm, hold it while it
-gets heavier, and let it go at a set time. All of it through the real nodes, topics, actions and
-simulated servos, as processes of their own, in a ROS domain of their own (unless ROS_DOMAIN_ID is
-set). Without ROS 2 and cyclonedds, all run in one process.
+"""The paper's grippers at work, with simulated servos.
+
+ccr demo: three pre-bent fingers close on a ball of 112 mm, hold it while it gets heavier, and let
+it go at a set time. ccr demo cube: three fingers grasp a cube of 40 mm, carry it and turn it 20 deg
+to either side, put it down and let it go. All of it goes through the real nodes, topics and
+actions, as processes of their own, in a ROS domain of their own (unless ROS_DOMAIN_ID is set).
+Without ROS 2 and cyclonedds, all run in one process.
 
 It leaves, in DIR: replay.html (open it in a browser), strip.png and recording.json; and prints what
 was measured. Exit code: 0 done, 1 a node failed, 2 bad input.
@@ -18,9 +21,12 @@ from pathlib import Path
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
+    parser.add_argument(
+        "what", nargs="?", default="sphere", help="sphere (default) or cube: what is grasped"
+    )
     parser.add_argument("--out", metavar="DIR", default="demo", help="folder (default: demo)")
     parser.add_argument(
-        "--hold", metavar="S", default="10", help="how long the ball is held (default: 10 s)"
+        "--hold", metavar="S", default="10", help="how long it is held (default: 10 s)"
     )
     parser.add_argument(
         "--record", metavar="FILE.mcap", help="record all topics, for Foxglove and ros2 bag"
@@ -40,13 +46,15 @@ def run(args: argparse.Namespace) -> int:
         InvalidFile, InvalidValue: A place cannot be written to, or the time is out of range.
     """
     # Here, so that `ccr demo --help` stays quick.
+    from ccr_ros.demo.kinds import demo_kind
     from ccr_ros.demo.progress import Progress
     from ccr_ros.demo.session import run_demo
     from ccr_ros.stack.parts import StackFailed
 
     progress = Progress(sys.stdout)
     try:
-        paths = run_demo(Path(args.out), _number(args.hold), progress, args.record)
+        kind = demo_kind(args.what)
+        paths = run_demo(kind, Path(args.out), _number(args.hold), progress, args.record)
     except StackFailed as error:
         progress.clear()
         print(f"ccr: error: {error}", file=sys.stderr)

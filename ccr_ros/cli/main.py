@@ -24,7 +24,7 @@ from ccr_ros.model.errors import CcrError
 COMMANDS: dict[str, tuple[str, str]] = {
     "demo": (
         "ccr_ros.cli.demo",
-        "three fingers grasp a ball and let it go; leaves a replay",
+        "three fingers grasp a ball, or turn a cube; leaves a replay",
     ),
     "test": ("ccr_ros.cli.test", "run the linters, the type checker and the tests"),
     "solve": ("ccr_ros.cli.solve", "solve one finger for given cable pulls"),

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 
 from ccr_ros.design.curve_text import object_from_text
@@ -36,6 +37,7 @@ def design_for_ball(folder: Path) -> tuple[Path, str]:
     Raises:
         InvalidFile: A file cannot be written.
     """
+    begin = time.monotonic()
     ball = object_from_text(f"sphere:{DIAMETER}")
     template = load_finger(find_config("sphere_finger"))  # of which the rest shape does not matter
     layout = GripperLayout(ball, HEIGHT, BASE_RADIUS, FINGERS)
@@ -46,4 +48,4 @@ def design_for_ball(folder: Path) -> tuple[Path, str]:
     paths = write_gripper(
         design.gripper, kinds, folder, "sphere_finger", "Made by: ccr demo", [text]
     )
-    return paths[0], text
+    return paths[0], f"designed {paths[0]} in {time.monotonic() - begin:.2f} s. {text}"

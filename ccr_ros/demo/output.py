@@ -29,7 +29,7 @@ def prepare_folder(folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
             pass
-        for name in (STRIP, REPLAY, RECORDING, *FILES):
+        for name in (STRIP, REPLAY, RECORDING, *FILES):  # of whichever demo it was
             (folder / name).unlink(missing_ok=True)
     except FileExistsError:
         raise InvalidFile(

@@ -3,16 +3,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 import numpy as np
 from builtin_interfaces.msg import Time as TimeMessage
-from ccr_msgs.msg import CablePulls, FingerState, GripperState, ObjectArray, ServoState
+from ccr_msgs.msg import (
+    CablePulls,
+    FingerState,
+    GraspState,
+    GripperState,
+    ObjectArray,
+    ServoState,
+)
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import Point, PoseArray
+from geometry_msgs.msg import Point, PoseArray, PoseStamped
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
@@ -34,8 +41,10 @@ from ccr_ros.nodes.qos import (
 from ccr_ros.stack.bag import BagWriter, record_topic
 from ccr_ros.viz.recording import Recording
 from ccr_ros.viz.recording_builder import RecordingBuilder
+from ccr_ros.viz.solids import SolidObject
 
 from .measurements import Measurements
+from .objects_seen import ObjectsSeen
 
 _FRAMES_PER_SECOND = 25.0
 _WARN_EVERY = 2.0  # s
@@ -68,6 +77,7 @@ class Recorder(Node):
     Args:
         gripper: The gripper of the solver node in the same namespace.
         bag: Where all topics are recorded as they are, or None.
+        support: What stands under the object while the fingers do not carry it: it is only drawn.
         options: Of `rclpy.node.Node`.
 
     Attributes:
@@ -75,7 +85,13 @@ class Recorder(Node):
         state_count: Number of states received so far.
     """
 
-    def __init__(self, gripper: Gripper, bag: BagWriter | None = None, **options: Any) -> None:
+    def __init__(
+        self,
+        gripper: Gripper,
+        bag: BagWriter | None = None,
+        support: Sequence[SolidObject] = (),
+        **options: Any,
+    ) -> None:
         super().__init__("demo_recorder", **options)
         self._gripper = gripper
         lengths = {m.finger.name: FingerSolver(m.finger).rest_lengths for m in gripper.fingers}
@@ -107,7 +123,10 @@ class Recorder(Node):
             for j, cable in enumerate(m.finger.cable_names)
         }
         self.create_subscription(JointState, "joint_states", self._joints_heard, JOINT_STATES)
+        self._seen = ObjectsSeen(support)
         self.create_subscription(ObjectArray, "objects", self._objects_heard, LATCHED)
+        self.create_subscription(GraspState, "grasp_state", self._grasp_heard, LATCHED)
+        self.create_subscription(PoseStamped, "object_pose", self._object_moved, LATCHED)
         # Counted, not looked at: left undecoded.
         self.create_subscription(MarkerArray, "markers", self._markers_heard, LATCHED, raw=True)
         self.create_timer(1.0 / _FRAMES_PER_SECOND, self._sample, clock=self._steady)
@@ -240,11 +259,20 @@ class Recorder(Node):
     def _objects_heard(self, message: ObjectArray) -> None:
         try:
             objects = objects_from_message(message, message.header.frame_id)
-            self._builder.set_objects([item.solid for item in objects])
+            self._seen.take_objects([item.solid for item in objects])
+            self._builder.set_objects(self._seen.bodies())
         except CcrError as error:
             self.get_logger().warning(
                 f"objects not recorded: {error}", throttle_duration_sec=_WARN_EVERY
             )
+
+    def _grasp_heard(self, message: GraspState) -> None:
+        self._builder.set_grip(self._seen.take_grasp(message))
+        self._builder.set_objects(self._seen.bodies())
+
+    def _object_moved(self, message: PoseStamped) -> None:
+        self._seen.take_pose(message.pose)
+        self._builder.set_objects(self._seen.bodies())
 
     def _markers_heard(self, _: bytes) -> None:
         self.measurements.markers += 1
@@ -259,6 +287,8 @@ def _topics(gripper: Gripper) -> list[tuple[type, str, QoSProfile]]:
     """All that the nodes of a gripper publish, with what it is published as."""
     topics: list[tuple[type, str, QoSProfile]] = [
         (ObjectArray, "objects", LATCHED),
+        (GraspState, "grasp_state", LATCHED),
+        (PoseStamped, "object_pose", LATCHED),
         (MarkerArray, "markers", LATCHED),
         (GripperState, "gripper_state", LATCHED),
         (ServoState, "servo_state", LATCHED),

@@ -15,38 +15,39 @@ from ccr_ros.model import Gripper, load_gripper
 from ccr_ros.runtime import enable_ros
 from ccr_ros.stack.bag import BagWriter, checked_bag_path
 from ccr_ros.stack.environment import graph_environment
-from ccr_ros.stack.parts import Part, StackFailed, Started, Starter
+from ccr_ros.stack.parts import StackFailed, Started, Starter
 from ccr_ros.stack.processes import SignalGuard
 from ccr_ros.stack.starter import starter_of_nodes
 from ccr_ros.stack.up import NODES, arguments_for, node_part
 from ccr_ros.viz.figures import force_unit
 from ccr_ros.viz.recording import Recording
 
-from .design import design_for_ball
+from .kinds import DemoKind
 from .measurements import Report
 from .output import prepare_folder, write_files
 from .progress import Progress
 from .scene import checked_hold
-from .summary import phase_lines
 
 if TYPE_CHECKING:
     from .recorder import Recorder
-    from .show import Show
+    from .story import Story
 
 NAMESPACE = "/gripper"
-BALL_NODE = Part("demo_ball", ("ccr_ros.demo",), "ccr_ros.demo.ball:BallNode")
 
 _PATIENCE = 5.0  # s of silence that nodes bear: nobody's object falls, and the machine may be busy
 _SILENCE_TIMEOUT = 10.0  # s without any pose once there was one
 _LOOK_EVERY = 0.1  # s between looks at the processes and updates of the progress line
 
 
-def run_demo(folder: Path, hold: float, progress: Progress, record: str | None) -> list[Path]:
-    """Run the demo; return the paths of the files it has left.
+def run_demo(
+    kind: DemoKind, folder: Path, hold: float, progress: Progress, record: str | None
+) -> list[Path]:
+    """Run a demo; return the paths of the files it has left.
 
     Args:
+        kind: Which.
         folder: Where to leave them.
-        hold: How long the ball is held [s].
+        hold: How long the object is held [s].
         progress: Told what happens.
         record: File in which all topics are recorded (MCAP), or None.
 
@@ -60,11 +61,9 @@ def run_demo(folder: Path, hold: float, progress: Progress, record: str | None) 
     hold = checked_hold(hold)
     bag_path = None if record is None else checked_bag_path(record)
     prepare_folder(folder)
-    progress.update("design", "of fingers for the ball")
-    begin = time.monotonic()
-    gripper_file, summary = design_for_ball(folder)
+    gripper_file, about = kind.gripper(folder)
     gripper = load_gripper(gripper_file)
-    progress.say(f"designed {gripper_file} in {time.monotonic() - begin:.2f} s. {summary}")
+    progress.say(about)
     os.environ.update(graph_environment(os.environ))
     embedded = enable_ros()
     with SignalGuard() as signals:
@@ -76,22 +75,23 @@ def run_demo(folder: Path, hold: float, progress: Progress, record: str | None) 
             bag as writer,
             starter_of_nodes(NAMESPACE) as starter,
         ):
-            nodes = _start(starter, gripper_file, Path(scratch))
+            nodes = _start(kind, starter, gripper_file, Path(scratch))
             progress.say(_introduction(embedded, nodes))
-            recording, report = _play(gripper, hold, nodes, progress, signals, writer)
+            recording, report = _play(kind, gripper, hold, nodes, progress, signals, writer)
         unit = force_unit(recording.forces_are)
-        progress.say(f"grasped, held and let go ({time.monotonic() - started:.1f} s):")
-        progress.say("\n".join(f"  {line}" for line in phase_lines(recording)))
+        progress.say(f"{kind.done} ({time.monotonic() - started:.1f} s):")
+        progress.say("\n".join(f"  {line}" for line in kind.lines(recording)))
         progress.say("measured:")
         progress.say("\n".join(f"  {line}" for line in report.lines(unit)))
         progress.update("writing", str(folder))
         paths = write_files(folder, recording, progress.say)
         progress.clear()
-    return [*paths, gripper_file] if bag_path is None else [*paths, gripper_file, bag_path]
+    made = [gripper_file] if gripper_file.name in kind.files else []
+    return [*paths, *made] if bag_path is None else [*paths, *made, bag_path]
 
 
-def _start(starter: Starter, gripper_file: Path, scratch: Path) -> list[Started]:
-    """Start the gripper's nodes and the ball."""
+def _start(kind: DemoKind, starter: Starter, gripper_file: Path, scratch: Path) -> list[Started]:
+    """Start the gripper's nodes, and what is there in place of a real object."""
     own: dict[str, dict[str, object]] = {
         "servo_bridge_node": {
             "driver": "loopback",
@@ -103,13 +103,17 @@ def _start(starter: Starter, gripper_file: Path, scratch: Path) -> list[Started]
         ),
     }
     shared = {"gripper_file": str(gripper_file.resolve())}
+    files = [str(path) for path in kind.parameter_files]
+    parts = (*(node_part(name) for name in NODES), kind.world)
+    given = {part.name: {**shared, **own.get(part.name, {})} for part in parts}
     return [
-        starter.start(part, *arguments_for(NAMESPACE, {**shared, **own.get(part.name, {})}, (), ()))
-        for part in (*(node_part(name) for name in NODES), BALL_NODE)
+        starter.start(part, *arguments_for(NAMESPACE, given[part.name], files, ()))
+        for part in parts
     ]
 
 
 def _play(
+    kind: DemoKind,
     gripper: Gripper,
     hold: float,
     nodes: list[Started],
@@ -118,7 +122,7 @@ def _play(
     bag: BagWriter | None,
 ) -> tuple[Recording, Report]:
     """Play the story, watch the nodes meanwhile; return what was recorded and measured."""
-    with _joined(gripper, hold, bag) as (recorder, show, executor):
+    with _joined(kind, gripper, hold, bag) as (recorder, show, executor):
         last_look = last_pose = time.monotonic()
         state_count = 0
         while not show.done:
@@ -157,7 +161,7 @@ def _check(recorder: Recorder, solver: Started, silence: float) -> None:
         raise solver.failure(f"has published no pose for {_SILENCE_TIMEOUT:g} s")
 
 
-def _show(recorder: Recorder, show: Show, progress: Progress) -> None:
+def _show(recorder: Recorder, show: Story, progress: Progress) -> None:
     if recorder.elapsed is None:
         progress.update("starting", "waiting for the nodes")
         return
@@ -174,8 +178,8 @@ def _show(recorder: Recorder, show: Show, progress: Progress) -> None:
 
 @contextmanager
 def _joined(
-    gripper: Gripper, hold: float, bag: BagWriter | None
-) -> Iterator[tuple[Recorder, Show, Any]]:
+    kind: DemoKind, gripper: Gripper, hold: float, bag: BagWriter | None
+) -> Iterator[tuple[Recorder, Story, Any]]:
     """Join the ROS graph: with a recorder, and what plays the story."""
     import rclpy
     from rclpy.context import Context
@@ -183,15 +187,14 @@ def _joined(
     from rclpy.signals import SignalHandlerOptions
 
     from .recorder import Recorder
-    from .show import Show
 
     context = Context()
     rclpy.init(args=[], context=context, signal_handler_options=SignalHandlerOptions.NO)
-    recorder = Recorder(gripper, bag, context=context, namespace=NAMESPACE)
+    recorder = Recorder(gripper, bag, kind.support, context=context, namespace=NAMESPACE)
     executor = SingleThreadedExecutor(context=context)
     executor.add_node(recorder)
     try:
-        yield recorder, Show(recorder, hold), executor
+        yield recorder, kind.story(recorder, hold), executor
     finally:
         executor.shutdown()
         context.try_shutdown()

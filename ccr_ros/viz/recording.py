@@ -17,6 +17,7 @@ from ..model import checks
 from ..model.errors import InvalidValue, UnknownName
 from ..model.rotation import Pose
 from ..model.solution import Contact
+from .recorded_grasp import GripFrame, heading
 from .solids import SolidObject, array, label
 
 FORCES_ARE = ("newton", "per_EI")
@@ -128,12 +129,14 @@ class Frame:
         fingers: By name; a finger that had not been heard of yet is absent.
         objects: Pose of each object present, by name; ``None``: all, at their recorded poses.
         phase: What the gripper is doing, in a word or two; empty: not known.
+        grip: Of the object that is solved together with the fingers; ``None``: there is none.
     """
 
     time: float
     fingers: Mapping[str, FingerFrame]
     objects: Mapping[str, Pose] | None = None
     phase: str = ""
+    grip: GripFrame | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "time", checks.real("time", self.time, low=0, unit="s"))
@@ -206,9 +209,13 @@ class Recording:
                         len(points),
                         f"2..{len(moment.backbone)} points, one per disk from the base on",
                     )
-        for name in frame.objects or ():
-            if name not in {o.name for o in self.objects}:
-                raise UnknownName("object", name, [o.name for o in self.objects])
+        objects = [o.name for o in self.objects]
+        for name in (*(frame.objects or ()), *([frame.grip.object] if frame.grip else ())):
+            if name not in objects:
+                raise UnknownName("object", name, objects)
+        for contact in frame.grip.contacts if frame.grip else ():
+            if contact.finger not in known:
+                raise UnknownName("finger", contact.finger, known)
 
     @property
     def duration(self) -> float:
@@ -223,6 +230,16 @@ class Recording:
             if frame.phase != (found[-1][1] if found else ""):
                 found.append((frame.time, frame.phase))
         return tuple(found)
+
+    def turned(self, frame: Frame, name: str) -> float | None:
+        """Return by how much an object has turned about z [rad] since it was first seen.
+
+        ``None`` where the frame does not show it.
+        """
+        if frame.objects is None or name not in frame.objects:
+            return None
+        first = next(f.objects[name] for f in self.frames if f.objects and name in f.objects)
+        return heading(frame.objects[name], first)
 
     def finger(self, name: str) -> RecordedFinger:
         """Return the finger of that name.

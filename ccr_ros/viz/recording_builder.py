@@ -13,6 +13,7 @@ from ..model.errors import InvalidValue, UnknownName
 from ..model.files import Gripper
 from ..model.rotation import Pose
 from ..model.solution import Contact, Solution
+from .recorded_grasp import GripFrame
 from .recording import FingerFrame, Frame, RecordedFinger, Recording, SolidObject
 
 # What must have arrived before a finger can be shown at all.
@@ -45,6 +46,7 @@ class RecordingBuilder:
         self._frames: list[Frame] = []
         self._start: float | None = None
         self._phase = ""
+        self._grip: GripFrame | None = None
         self.set_objects(objects)
 
     @classmethod
@@ -160,6 +162,11 @@ class RecordingBuilder:
                     )
             self._present = {o.name: o.pose for o in objects}
 
+    def set_grip(self, grip: GripFrame | None) -> None:
+        """Note what is known from now on of the object in the fingers."""
+        with self._lock:
+            self._grip = grip
+
     def set_phase(self, phase: str) -> None:
         """Note what the gripper is doing from now on, in a word or two."""
         with self._lock:
@@ -175,12 +182,12 @@ class RecordingBuilder:
         """
         with self._lock:
             latest = {name: dict(v) for name, v in self._latest.items()}
-            present, phase = dict(self._present), self._phase
+            present, phase, grip = dict(self._present), self._phase, self._grip
         start = time if self._start is None else self._start
         if self._frames and time - start <= self._frames[-1].time:
             return
         fingers = {n: FingerFrame(**v) for n, v in latest.items() if all(k in v for k in _NEEDED)}
-        self._frames.append(Frame(time - start, fingers, present, phase))
+        self._frames.append(Frame(time - start, fingers, present, phase, grip))
         self._start = start
 
     def build(self) -> Recording:

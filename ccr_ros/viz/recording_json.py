@@ -13,6 +13,7 @@ import numpy as np
 from ..model.errors import InvalidFile, InvalidValue
 from ..model.rotation import Pose
 from ..model.solution import Contact
+from .recorded_grasp import GripContact, GripFrame
 from .recording import FingerFrame, Frame, RecordedFinger, Recording, SolidObject
 
 FORMAT = "ccr_ros recording"
@@ -140,6 +141,21 @@ def _frame(frame: Frame) -> dict[str, Any]:
         out["objects"] = {name: _pose(pose) for name, pose in frame.objects.items()}
     if frame.phase:
         out["phase"] = frame.phase
+    if frame.grip is not None:
+        out["grip"] = {
+            "object": frame.grip.object,
+            "held": frame.grip.held,
+            "contacts": [
+                {
+                    "finger": c.finger,
+                    "position": _round(c.position),
+                    "force": _significant(c.force),
+                    "friction": [_significant(f) for f in c.friction.tolist()],
+                    "margin": None if c.margin is None else _significant(c.margin),
+                }
+                for c in frame.grip.contacts
+            ],
+        }
     return out
 
 
@@ -234,7 +250,28 @@ def _read_frame(data: Any) -> Frame:
     objects = None
     if "objects" in data:
         objects = {name: _read_pose(pose) for name, pose in _get(data, "objects", dict).items()}
-    return Frame(data.get("time"), fingers, objects, data.get("phase", ""))
+    grip = None
+    if "grip" in data:
+        try:
+            grip = _read_grip(_get(data, "grip", dict))
+        except InvalidValue as error:
+            raise error.located("grip") from None
+    return Frame(data.get("time"), fingers, objects, data.get("phase", ""), grip)
+
+
+def _read_grip(data: Any) -> GripFrame:
+    contacts = _each("contacts", _get(data, "contacts", list), _read_grip_contact)
+    return GripFrame(_get(data, "object", str), _get(data, "held", bool), tuple(contacts))
+
+
+def _read_grip_contact(data: Any) -> GripContact:
+    return GripContact(
+        finger=_get(data, "finger", str),
+        position=_get(data, "position", list),
+        force=data.get("force"),
+        friction=_get(data, "friction", list),
+        margin=data.get("margin"),
+    )
 
 
 def _read_finger_frame(data: Any) -> FingerFrame:

@@ -16,7 +16,7 @@ from rclpy.parameter import Parameter
 from rclpy.parameter_client import AsyncParameterClient
 from std_srvs.srv import Trigger
 
-from ccr_ros.demo.session import BALL_NODE
+from ccr_ros.demo.kinds import BALL_NODE
 from ccr_ros.nodes.qos import LATCHED
 from ccr_ros.stack.environment import import_environment
 from ccr_ros.stack.processes import Children
