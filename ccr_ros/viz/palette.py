@@ -6,6 +6,8 @@ from __future__ import annotations
 # One per finger, or per cable of a single finger.
 PALETTE = ("#2f7de1", "#12a06e", "#d98a00", "#8b5cf6", "#0aa5c2", "#d6569f", "#7a9e1f", "#a8714a")
 CONTACT = "#d92d3a"
+FRICTION = "#8247d8"
+OBJECT = "#0aa5c2"
 REST = "#9aa3af"
 WANTED = "#e255b5"
 BACKBONE = "#2b3442"

@@ -14,7 +14,7 @@ import json
 from importlib import resources
 from pathlib import Path
 
-from .palette import CONTACT, PALETTE
+from .palette import CONTACT, FRICTION, OBJECT, PALETTE
 from .recording import Recording
 from .recording_json import recording_to_json, write_text
 
@@ -28,6 +28,8 @@ _SCRIPTS = (
     "controls.js",
     "player.js",
 )
+
+_STYLE = {"palette": PALETTE, "contact": CONTACT, "friction": FRICTION, "object": OBJECT}
 
 
 def write_replay(recording: Recording, path: str | Path) -> Path:
@@ -45,7 +47,7 @@ def replay_html(recording: Recording) -> str:
         "@@TITLE@@": html.escape(f"{recording.gripper} - replay"),
         "@@CSS@@": _template("replay.css"),
         "@@RECORDING@@": _safe(recording_to_json(recording)),
-        "@@STYLE@@": _safe(json.dumps({"palette": PALETTE, "contact": CONTACT})),
+        "@@STYLE@@": _safe(json.dumps(_STYLE)),
         "@@JS@@": "\n".join(_template(name) for name in _SCRIPTS),
     }
     # One pass over the template alone: a name in the recording that looks like a placeholder

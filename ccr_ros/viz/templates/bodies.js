@@ -15,6 +15,14 @@ function objectsAt(data, frame) {
   return data.objects.filter((o) => frame.objects[o.name]).map((o) => ({ ...o, ...frame.objects[o.name] }));
 }
 
+/** By how much an object has turned about z [degree] since another orientation: the twist of the turn between. */
+function headingSince(then, now) {
+  const [ax, ay, az, aw] = then, [bx, by, bz, bw] = now; // now times the inverse of then; its z and w
+  const z = bz * aw - bw * az - bx * ay + by * ax, w = bw * aw + bx * ax + by * ay + bz * az;
+  const angle = 2 * Math.atan2(z, w);
+  return (angle - 2 * Math.PI * Math.round(angle / (2 * Math.PI))) * 180 / Math.PI;
+}
+
 /** Poses of a finger part of the way between two frames; all else is the earlier frame's. */
 function between(now, then, t) {
   if (now.backbone.length !== then.backbone.length) return now;

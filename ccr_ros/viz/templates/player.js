@@ -41,6 +41,27 @@ if (scene.maxForce > 0) {
     values: data.frames.map((frame) => (frame.fingers[finger.name] ? force(frame.fingers[finger.name]) : null)),
   })));
 }
+if (data.frames.some((frame) => frame.grip && frame.grip.held)) {
+  const margin = (frame, name) => {
+    const own = frame.grip && frame.grip.held ? frame.grip.contacts.filter((c) => c.finger === name && c.margin !== null).map((c) => c.margin) : [];
+    return own.length ? Math.min(...own) : null;
+  };
+  addChart("Friction margin", "while carried; slips at 0", data.fingers.map((finger, k) => ({
+    finger: finger.name, color: colorOf(k, 0), dash: [], values: data.frames.map((frame) => margin(frame, finger.name)),
+  })));
+}
+const turns = data.objects.map((object) => {
+  const first = data.frames.find((frame) => frame.objects && frame.objects[object.name]);
+  return { name: object.name, values: data.frames.map((frame) => {
+    const now = frame.objects && frame.objects[object.name];
+    return now ? headingSince(first.objects[object.name].orientation, now.orientation) : null;
+  }) };
+}).filter((turn) => turn.values.some((v) => Math.abs(v) > 1));
+if (turns.length) {
+  addChart("Turn about z", `° of ${turns.map((turn) => turn.name).join(", ")}`, turns.map((turn, k) => ({
+    finger: "", color: style.object, dash: dashOf(0, k), values: turn.values,
+  })));
+}
 addChart("Cable pull", "mm", series((f, j) => f.pulls[j] * 1e3));
 if (data.frames.some((frame) => Object.values(frame.fingers).some((f) => f.servo_angles))) {
   addChart("Servo angle", "°", series((f, j) => (f.servo_angles ? f.servo_angles[j] * 180 / Math.PI : null)));
@@ -72,6 +93,9 @@ function describe() {
   const entries = [["cable, wider = more tension", colorOf(0, 0), []]];
   if (slack) entries.push(["slack cable", "#8a94a3", [4, 3.5]]);
   if (scene.maxForce > 0) entries.push([`contact, force on the finger (longest: ${plain(scene.maxForce)} ${unitText})`, style.contact, []]);
+  if (data.frames.some((frame) => frame.grip && frame.grip.contacts.some((c) => c.margin !== null))) {
+    entries.push(["friction on the finger, on the same scale", style.friction, []]);
+  }
   for (const [text, color, dash] of entries) {
     const item = document.createElement("li");
     item.append(swatch(color, dash), text);

@@ -70,7 +70,7 @@ class Scene {
     const get = (name) => rgb(style.getPropertyValue(name));
     this.theme = {
       metal: get("--metal"), plate: get("--plate"), grid: get("--grid"), object: get("--object"),
-      objectDark: get("--object-dark"), slack: get("--slack"), contact: get("--contact"), text: get("--text"),
+      objectDark: get("--object-dark"), slack: get("--slack"), contact: get("--contact"), friction: get("--friction"), text: get("--text"),
       panel: get("--panel"), dark: document.documentElement.classList.contains("dark"),
     };
   }
@@ -89,6 +89,10 @@ class Scene {
       const now = frame.fingers[finger.name], then = next.fingers[finger.name];
       if (now) this.addFinger(finger, k, t > 0 && then ? between(now, then, t) : now, hidden.has(finger.name), shadows);
     });
+    for (const c of frame.grip ? frame.grip.contacts : []) {
+      const size = Math.hypot(...c.friction);
+      if (!hidden.has(c.finger) && size > 0.02 * this.maxForce) this.addContact(c.position, scale(c.friction, 1 / size), size, this.theme.friction);
+    }
     if (camera.eye[2] >= -0.02) this.drawGround(shadows);
     this.items.sort((a, b) => b.depth - a.depth);
     for (const item of this.items) { ctx.globalAlpha = item.alpha; item.paint(ctx); }
@@ -157,7 +161,7 @@ class Scene {
       if (path) this.addCable(path.map((p) => place(base, p)), rgb(this.colorOf(k, j)), now.tensions[j], alpha);
     });
     if (hidden) return;
-    for (const contact of now.contacts) this.addContact(place(base, contact.position), turn(base.axes, contact.normal), contact.force);
+    for (const contact of now.contacts) this.addContact(place(base, contact.position), turn(base.axes, contact.normal), contact.force, this.theme.contact);
     if (!now.converged || now.stale) {
       const [x, y] = camera.project(points[points.length - 1]);
       this.put(-1, (ctx) => {
@@ -239,7 +243,8 @@ class Scene {
     }
   }
 
-  addContact(position, normal, force) {
+  /** An arrow as long as a force, from where it acts; tint: its colour. */
+  addContact(position, normal, force, tint) {
     const { camera, theme } = this, share = this.maxForce > 0 ? force / this.maxForce : 0;
     const tip = along(position, normal, 0.012 + 0.024 * share);
     const p = camera.project(position), q = camera.project(tip);
@@ -247,7 +252,7 @@ class Scene {
     const ux = dx / (span || 1), uy = dy / (span || 1);
     this.put(camera.depth(tip) - 0.004, (ctx) => {
       ctx.lineCap = "butt";
-      for (const [color, w] of [[css(theme.panel, 0.85), 5.2], [css(theme.contact), 2.8]]) {
+      for (const [color, w] of [[css(theme.panel, 0.85), 5.2], [css(tint), 2.8]]) {
         ctx.strokeStyle = ctx.fillStyle = color; ctx.lineWidth = w; ctx.beginPath();
         ctx.moveTo(p[0], p[1]); ctx.lineTo(q[0] - ux * head, q[1] - uy * head); ctx.stroke();
         const grow = w > 4 ? 1.4 : 0, hw = head * 0.48 + grow;
