@@ -248,7 +248,7 @@ def test_a_folder_without_permission_is_reported(tmp_path):
 
 
 def test_without_matplotlib_the_strip_is_left_out(tmp_path, monkeypatch):
-    def missing(*_):
+    def missing(*_, **__):
         raise MissingMatplotlib
 
     for writer in ("save_recording", "write_replay"):

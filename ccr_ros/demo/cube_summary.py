@@ -35,7 +35,7 @@ def _state(recording: Recording, frames: list[Frame], unit: str) -> str:
     if not frames:
         return ""
     words = []
-    turned = recording.turned(frames[-1], CUBE.name)
+    turned = _turned(recording, frames[-1])
     if turned is not None:
         words.append(f"turned {math.degrees(turned):+5.1f} deg")
     forces = _forces(frames[-1:])
@@ -49,7 +49,7 @@ def _state(recording: Recording, frames: list[Frame], unit: str) -> str:
 
 def _in_all(recording: Recording, unit: str) -> list[str]:
     carried = [f for f in recording.frames if f.grip is not None and f.grip.held]
-    turns = [t for f in carried if (t := recording.turned(f, CUBE.name)) is not None]
+    turns = [t for f in carried if (t := _turned(recording, f)) is not None]
     if not turns:
         return ["the fingers never carried the cube"]
     left, right = math.degrees(max(turns)), -math.degrees(min(turns))
@@ -63,6 +63,19 @@ def _in_all(recording: Recording, unit: str) -> list[str]:
     if forces := _forces(carried):
         lines.append(f"each contact pressed with {_range(forces)} {unit}")
     return lines
+
+
+def _turned(recording: Recording, frame: Frame) -> float | None:
+    """Turn about z [rad] since the fingers have carried it, before it was first turned."""
+    turned = recording.turned(frame, CUBE.name)
+    hung = [f for f in recording.frames if f.phase == "hold" and f.grip and f.grip.held]
+    first = [f for f in hung if f.time < _first_turn(recording)]
+    begin = recording.turned(first[-1], CUBE.name) if first else 0.0
+    return None if turned is None else turned - (begin or 0.0)
+
+
+def _first_turn(recording: Recording) -> float:
+    return min((time for time, phase in recording.phases if "turn" in phase), default=math.inf)
 
 
 def _forces(frames: list[Frame]) -> list[float]:

@@ -36,6 +36,7 @@ class DemoKind:
         lines: What is told of a recording at the end.
         done: What has been done then, in words.
         parameter_files: For all nodes.
+        shown: Phases of which the strip shows the ends; none: where most happens.
         support: What is drawn under the object while it stands.
     """
 
@@ -46,6 +47,7 @@ class DemoKind:
     lines: Callable[[Recording], list[str]]
     done: str
     parameter_files: tuple[Path, ...] = ()
+    shown: tuple[str, ...] = ()
     support: tuple[SolidObject, ...] = ()
 
 
@@ -85,6 +87,7 @@ def _cube() -> DemoKind:
         lines=cube_lines,
         done="grasped, turned to both sides, put down and let go",
         parameter_files=(config_dir() / "nodes" / f"{cube_scene.GRIPPER_FILE}.yaml",),
+        shown=("close", "turn left", "turn right", "put down", "open"),
         support=cube_scene.TABLE,
     )
 

@@ -42,8 +42,16 @@ def prepare_folder(folder: Path) -> None:
         ) from None
 
 
-def write_files(folder: Path, recording: Recording, say: Callable[[str], None]) -> list[Path]:
+def write_files(
+    folder: Path, recording: Recording, say: Callable[[str], None], phases: tuple[str, ...] = ()
+) -> list[Path]:
     """Write the recording, the replay and, if matplotlib is there, the strip; return their paths.
+
+    Args:
+        folder: Where to.
+        recording: What was seen.
+        say: Told what is left out.
+        phases: Of which the strip shows the ends; see `write_strip`.
 
     Raises:
         InvalidFile: A file cannot be written.
@@ -53,7 +61,7 @@ def write_files(folder: Path, recording: Recording, say: Callable[[str], None]) 
         write_replay(recording, folder / REPLAY),
     ]
     try:
-        paths.append(write_strip(recording, folder / STRIP))
+        paths.append(write_strip(recording, folder / STRIP, phases=phases))
     except MissingMatplotlib as error:
         say(f"no {STRIP}: {error}")
     return paths

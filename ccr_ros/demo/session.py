@@ -84,7 +84,7 @@ def run_demo(
         progress.say("measured:")
         progress.say("\n".join(f"  {line}" for line in report.lines(unit)))
         progress.update("writing", str(folder))
-        paths = write_files(folder, recording, progress.say)
+        paths = write_files(folder, recording, progress.say, kind.shown)
         progress.clear()
     made = [gripper_file] if gripper_file.name in kind.files else []
     return [*paths, *made] if bag_path is None else [*paths, *made, bag_path]

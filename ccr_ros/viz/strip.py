@@ -13,6 +13,7 @@ import numpy as np
 
 from ..model import checks
 from .figures import MM, checked_path, force_unit, new_figure, save
+from .palette import OBJECT
 from .recording import FingerFrame, Frame, Recording
 from .sketch import View, bounds, cable_color, draw_moment, draw_plate
 
@@ -22,13 +23,16 @@ if TYPE_CHECKING:
 _DASHES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (1.5, 1.5)), (0, (6, 2, 1.5, 2)))
 
 
-def write_strip(recording: Recording, path: str | Path, count: int = 5) -> Path:
+def write_strip(
+    recording: Recording, path: str | Path, count: int = 5, phases: tuple[str, ...] = ()
+) -> Path:
     """Draw the strip of a recording to a PNG (or SVG, PDF) file and return its path.
 
     Args:
         recording: The recording.
         path: The file; its directory must exist.
         count: Number of moments shown, 1..12; see `moments`.
+        phases: Where given, the ends of these phases are shown instead.
 
     Raises:
         InvalidValue: A wrong count, or a path that does not end in a known picture format.
@@ -36,7 +40,7 @@ def write_strip(recording: Recording, path: str | Path, count: int = 5) -> Path:
         MissingMatplotlib: matplotlib is not installed.
     """
     out = checked_path(path)
-    return save(figure_of_recording(recording, count), out, dpi=120)
+    return save(figure_of_recording(recording, count, phases), out, dpi=120)
 
 
 def moments(recording: Recording, count: int) -> tuple[int, ...]:
@@ -58,13 +62,26 @@ def moments(recording: Recording, count: int) -> tuple[int, ...]:
     return tuple(dict.fromkeys(int(np.argmin(np.abs(progress - m))) for m in marks))
 
 
-def figure_of_recording(recording: Recording, count: int = 5) -> Figure:
+def phase_ends(recording: Recording, phases: tuple[str, ...]) -> tuple[int, ...]:
+    """Return the index of the last frame of the first phase of each of these names, in turn."""
+    frames, ends = recording.frames, []
+    for name in phases:
+        own = [i for i, frame in enumerate(frames) if frame.phase == name]
+        run = [i for k, i in enumerate(own) if i == own[0] + k]
+        ends += run[-1:]
+    return tuple(sorted(set(ends)))
+
+
+def figure_of_recording(
+    recording: Recording, count: int = 5, phases: tuple[str, ...] = ()
+) -> Figure:
     """Return the figure that `write_strip` writes.
 
-    Its axes are labelled "t=...", then "tension", "force" (where there is contact), "pull" and
-    "servo" (where servo angles are known).
+    Its axes are labelled "t=...", then "tension", "force" (where there is contact), "margin" (where
+    an object is carried with friction), "turn" (where an object turns about z), "pull" and "servo"
+    (where servo angles are known).
     """
-    shown = moments(recording, count)
+    shown = phase_ends(recording, phases) or moments(recording, count)
     view = View()
     low, high = bounds(recording, view)
     middle, half = (low + high) / 2, (high - low) / 2 + 12.0  # mm of air, and room for force arrows
@@ -95,11 +112,18 @@ def figure_of_recording(recording: Recording, count: int = 5) -> Figure:
         axes.set_xlim(middle[0] - half[0], middle[0] + half[0])
         axes.set_ylim(middle[1] - half[1], middle[1] + half[1])
         axes.set_axis_off()
-        axes.set_title(f"{frame.time:.1f} s\n{_state(frame)}", fontsize=10, color="#18212e")
+        phase = f", {frame.phase}" if phases and frame.phase else ""
+        title = f"{frame.time:.1f} s{phase}\n{_state(frame)}"
+        axes.set_title(title, fontsize=10, color="#18212e")
     first: Any = None
     for row, (label, title, value) in enumerate(curves, 1):
         axes = figure.add_subplot(grid[row, :], label=label, sharex=first)
-        _curves(axes, recording, shown, value, title, per_cable=label != "force")
+        if isinstance(value, str):
+            _turn(axes, recording, value)
+            _marks(axes, recording, shown, title)
+        else:
+            per_cable = label not in ("force", "margin")
+            _curves(axes, recording, shown, value, title, per_cable=per_cable)
         axes.tick_params(labelbottom=row == len(curves))
         first = first or axes
     axes.set_xlabel("time [s]", fontsize=9)
@@ -125,7 +149,8 @@ def _state(frame: Frame) -> str:
     return ", ".join(words)
 
 
-_Value = Callable[[FingerFrame, int], "float | None"]
+# Of a finger of this name and its cable in a frame; or the name of an object that turns.
+_Value = Callable[[Frame, str, int], "float | None"] | str
 
 
 def _panels(recording: Recording) -> list[tuple[str, str, _Value]]:
@@ -133,15 +158,32 @@ def _panels(recording: Recording) -> list[tuple[str, str, _Value]]:
     unit = force_unit(recording.forces_are)
     moments = [f for frame in recording.frames for f in frame.fingers.values()]
     panels: list[tuple[str, str, _Value]] = [
-        ("tension", f"tension [{unit}]", lambda f, j: float(f.tensions[j]))
+        ("tension", f"tension [{unit}]", _own(lambda f, j: float(f.tensions[j])))
     ]
     if any(f.contacts for f in moments):
         title = f"contact force\nper finger [{unit}]"
-        panels.append(("force", title, lambda f, _: sum(c.force for c in f.contacts)))
-    panels.append(("pull", "pull [mm]", lambda f, j: float(f.pulls[j]) * MM))
+        panels.append(("force", title, _own(lambda f, _: sum(c.force for c in f.contacts))))
+    if any(f.grip is not None and f.grip.held for f in recording.frames):
+        panels.append(("margin", "friction margin\nwhile carried", _margin))
+    for body in recording.objects:
+        turns = [recording.turned(frame, body.name) for frame in recording.frames]
+        if any(t is not None and abs(t) > math.radians(1.0) for t in turns):
+            panels.append(("turn", f"turn of\n{body.name} [deg]", body.name))
+    panels.append(("pull", "pull [mm]", _own(lambda f, j: float(f.pulls[j]) * MM)))
     if any(f.servo_angles is not None for f in moments):
-        panels.append(("servo", "servo [deg]", _servo_degrees))
+        panels.append(("servo", "servo [deg]", _own(_servo_degrees)))
     return panels
+
+
+def _own(
+    value: Callable[[FingerFrame, int], float | None],
+) -> Callable[[Frame, str, int], float | None]:
+    """What depends on the finger alone."""
+    return lambda frame, name, cable: value(frame.fingers[name], cable)
+
+
+def _margin(frame: Frame, name: str, _: int) -> float | None:
+    return frame.grip.margin_of(name) if frame.grip is not None and frame.grip.held else None
 
 
 def _servo_degrees(frame: FingerFrame, cable: int) -> float | None:
@@ -164,7 +206,7 @@ def _curves(
     axes: Any,
     recording: Recording,
     shown: tuple[int, ...],
-    value: _Value,
+    value: Callable[[Frame, str, int], float | None],
     label: str,
     per_cable: bool,
 ) -> None:
@@ -173,7 +215,7 @@ def _curves(
         frames = [f for f in recording.frames if finger.name in f.fingers]
         times = [f.time for f in frames]
         for j, cable in enumerate(finger.cables if per_cable else finger.cables[:1]):
-            values = [value(f.fingers[finger.name], j) for f in frames]
+            values = [value(f, finger.name, j) for f in frames]
             axes.plot(
                 times,
                 [math.nan if v is None else v for v in values],
@@ -183,6 +225,18 @@ def _curves(
                 lw=1.2 + (1.6 * (last - k) if last < 4 else 0),
                 label=f"{finger.name} {cable}",
             )
+    _marks(axes, recording, shown, label)
+
+
+def _turn(axes: Any, recording: Recording, name: str) -> None:
+    """Draw by how much an object has turned about z."""
+    turns = [recording.turned(frame, name) for frame in recording.frames]
+    degrees = [math.nan if t is None else math.degrees(t) for t in turns]
+    axes.plot([f.time for f in recording.frames], degrees, color=OBJECT, lw=2.0)
+
+
+def _marks(axes: Any, recording: Recording, shown: tuple[int, ...], label: str) -> None:
+    """Mark phases and the moments shown; name the axis, and dress it."""
     for time, _ in recording.phases[1:]:
         axes.axvline(time, color="#4a5568", lw=0.7, alpha=0.35)
     for index in shown:
