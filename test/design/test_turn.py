@@ -41,6 +41,15 @@ def test_the_cube_turns_20_degrees_both_ways_within_every_cone(turned):
     assert turned.reached(np.deg2rad(20)) and not turned.reached(np.deg2rad(21))
 
 
+@pytest.mark.long
+def test_with_straight_cables_it_turns_30_degrees_both_ways():
+    fingers = load_gripper(find_config("gripper_cube_straight")).fingers
+    result = evaluate_turn(fingers, replace(TASK, farthest=np.deg2rad(30)), LONG)
+    assert result.hold.stable and result.hold.margin > 0.4
+    assert result.reached(np.deg2rad(30))
+    assert min(way.plan.margin for way in result.ways) > 0.07
+
+
 def test_a_record_goes_from_one_end_to_the_other_through_the_hold(turned):
     record = record_turn(turned)
     assert np.rad2deg(record.angles[[0, -1]]) == pytest.approx([-20, 20], abs=0.3)

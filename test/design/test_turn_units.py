@@ -40,9 +40,9 @@ def gripper():
 
 def test_the_cube_gripper_is_a_thumb_and_a_mirrored_pair(gripper):
     assert units_of(gripper) == (Unit(0), Unit(1, 2))
-    assert kinds_of(gripper) == [0, 1, 2]
-    sphere = load_gripper(find_config("gripper_sphere"))
-    assert kinds_of(sphere) == [0, 0, 0]
+    straight = load_gripper(find_config("gripper_cube_straight"))
+    assert units_of(straight) == units_of(gripper)
+    assert kinds_of(gripper) == [0, 1, 2] and kinds_of(straight) == [0, 1, 1]
 
 
 def test_fingers_that_differ_are_no_pair(gripper):
