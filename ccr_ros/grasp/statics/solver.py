@@ -69,11 +69,7 @@ class GraspSolver:
     ) -> None:
         if not fingers:
             raise InvalidValue("fingers", fingers, "at least one finger")
-        units = {m.finger.forces_are for m in fingers}
-        if len(units) > 1 or (units != {"newton"} and body.mass > 0):
-            raise InvalidValue(
-                "youngs_modulus", None, "given for every finger, so that forces are in newtons"
-            )
+        _check_units(fingers, body)
         self.hand = Hand(fingers, settings)
         self.settings = self.hand.problems[0].settings
         self.body = body
@@ -124,6 +120,7 @@ class GraspSolver:
         begin = time.perf_counter()
         target = self._checked_pulls(pulls)
         body = self.body if mass is None else replace(self.body, mass=mass)
+        _check_units(self.hand.mounted, body)
         outer = self._outer.copy()
         if force is not None:
             outer[:3] = checks.vector("force", force, 3, unit="N", largest=1e6)
@@ -294,3 +291,10 @@ class GraspSolver:
 
     def _accept(self, point: GraspPoint, pulls: list[np.ndarray]) -> None:
         self._point, self._pulls = point, [p.copy() for p in pulls]
+
+
+def _check_units(fingers: Sequence[MountedFinger], body: Body) -> None:
+    units = {m.finger.forces_are for m in fingers}
+    if len(units) > 1 or (units != {"newton"} and body.mass > 0):
+        allowed = "given for every finger, so that forces are in newtons"
+        raise InvalidValue("youngs_modulus", None, allowed)
