@@ -30,8 +30,10 @@ from .assembly import FingerBlock, GraspPoint, Hand
 from .surface import Surface, surface_of
 
 # Weights of the augmentation (as in ccr_ros.model.sqp), in turn until the matrix is definite; in
-# a grasp it is the others' contacts that make a finger stable, which may take more than 10.
-_AUGMENT = (100.0, 1e3, 1e5)
+# a grasp it is the others' contacts that make a finger stable, which may take more than 10. A
+# constraint that lets go is held back by its weight, so the first is low where some may.
+_AUGMENT = (10.0, 1e3, 1e5)
+_AUGMENT_HELD = (1e3, 1e5)
 _PROX = 1e-9  # of the object's own block: a ball may turn freely, and shall not
 _ROUNDING = 1e-12  # units of length
 _YIELD = 1e-8  # relative compliance of points that stick, from force to force: twins share a load
@@ -99,7 +101,7 @@ def _attempt(
     task: _Task, chosen: list[np.ndarray], solve: Callable[..., np.ndarray | None] | None
 ) -> Step | None:
     """The step with some of each finger's lengths and normals; their forces by ``solve``."""
-    for weight in _AUGMENT:
+    for weight in _AUGMENT if solve is None else _AUGMENT_HELD:
         checked = definite if weight == _AUGMENT[-1] else _upright
         system = _eliminated(task, chosen, weight, checked)
         if system is not None:
