@@ -17,9 +17,11 @@ from .machine import Event
 from .motion import ObjectWatch
 from .move_path import MovePath
 from .moves import MoveRun
-from .progress import Lasting, Progress
+from .progress import Progress
 from .runs import End, Outcome
 from .settings import GraspSettings
+
+_STILL = 10  # of the tolerance; an object may turn by many degrees for a millimetre of pull
 
 PLAN = "plan"
 GO = "go"
@@ -64,7 +66,6 @@ class Moving:
         self._offset: dict[str, np.ndarray] = {}  # of the commands, from the plan [m]
         self._way = 0.0
         self._followed_at = now
-        self._still = Lasting()
         self._stood: np.ndarray | None = None  # measured pulls of all fingers [m], a while ago
         self._stood_at = now
         self._progress = Progress(settings)
@@ -176,7 +177,7 @@ class Moving:
     def _settled(self, now: float) -> bool:
         """Tell whether all fingers have come to rest where they were sent, and the pose with them.
 
-        At rest is what has not moved by a quarter of the tolerance in ``settle_time``.
+        At rest is what has not moved by a tenth of the tolerance in ``settle_time``.
         """
         tolerance, measured = self._settings.place_tolerance, []
         there = self._thing.fresh is not None
@@ -185,15 +186,14 @@ class Moving:
                 return False
             measured.append(finger.measured)
             there = there and _far(finger.command, finger.measured) <= tolerance
-            there = there and _far(finger.solved.pulls, finger.measured) <= tolerance / 4
+            there = there and _far(finger.solved.pulls, finger.measured) <= tolerance / _STILL
         at = np.concatenate(measured)
-        if self._stood is None or _far(at, self._stood) > tolerance / 4:
+        if self._stood is None or _far(at, self._stood) > tolerance / _STILL:
             self._stood, there = at, False
         if not there:
             self._stood_at = now
-        # What is told of the object must be of since then.
-        still = self._still.holds(there, now, self._settings.settle_time)
-        return still and self._thing.heard_at > self._stood_at
+        # And what is told of the object must be of the end of that time.
+        return self._thing.heard_at - self._stood_at >= self._settings.settle_time
 
     def _followed(self, path: MovePath) -> bool:
         """Tell whether the poses are near enough to where the plan is to go on."""

@@ -87,7 +87,7 @@ class CubeStack(GripperStack):
             solver={
                 "mode": "gripper",
                 "gripper_file": "gripper_cube",
-                "time_limit": 20.0,
+                "time_limit": 2.0,
                 **(solver or {}),
             },
             start=False,

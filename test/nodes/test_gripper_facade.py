@@ -9,7 +9,7 @@ import pytest
 from gripper_stack import BALL
 
 from ccr_ros.gripper import Gripper, GripperFailed, GripperRefused, NoGripper
-from ccr_ros.model import CcrError
+from ccr_ros.model import CcrError, InvalidValue
 
 
 @contextmanager
@@ -17,6 +17,13 @@ def spinning(stack):
     """Spin the nodes of a gripper in a thread; return them, and a facade to them."""
     stack.ready()
     stack.show()  # so that the publisher is known: from another thread it only publishes
+    with connected(stack) as gripper:
+        yield stack, gripper
+
+
+@contextmanager
+def connected(stack):
+    """Spin the nodes in a thread; return a facade to them."""
     over = threading.Event()
 
     def spin():
@@ -27,7 +34,7 @@ def spinning(stack):
     thread.start()
     try:
         with Gripper("/gripper") as gripper:
-            yield stack, gripper
+            yield gripper
     finally:
         over.set()
         thread.join()
@@ -86,6 +93,25 @@ def test_what_is_in_hand(stack):
         assert gripper.state.object_held  # the coordinator goes on holding it
         nodes.show()
         gripper._wait(lambda: gripper.in_hand is None, 60.0)
+
+
+@pytest.mark.long
+def test_what_is_held_is_moved(cube):
+    stack = cube().holding()
+    with connected(stack) as gripper:
+        report = gripper.rotate(0.06)
+        assert report.done and report.state == "holding" and not report.limiting
+        assert report.turn[2] == pytest.approx(0.06, abs=0.021)
+        assert report.fraction == 1.0 and report.margin > 0.1
+        with pytest.raises(GripperRefused, match=r"margin: 1\.5"):
+            gripper.move(shift=(0.0, 0.0, 0.001), margin=1.5)
+        for bad in ((float("nan"), 0.0, 0.0), (1.0, 2.0)):
+            with pytest.raises(InvalidValue, match="shift"):
+                gripper.move(shift=bad)
+        with pytest.raises(GripperFailed, match="cannot be moved so") as failed:
+            gripper.rotate(3.0, margin=0.3)
+        assert failed.value.report.limiting and failed.value.report.fraction == 0.0
+        assert gripper.state.object_held and gripper.in_hand.held
 
 
 def test_errors_say_what_is_wrong(running):
