@@ -118,6 +118,13 @@ def test_what_cannot_be_reached_names_what_limits_it(solver):
     assert drifted.share < slipping.share and "not asked for" in drifted.limiting
 
 
+def test_what_no_pull_brings_together_ends(solver):
+    """Four cables cannot do a shift and a turn that have little to do with each other."""
+    target = MoveTarget(shift=np.array([0.0, 0.0, 0.001]), turn=np.array([0.0, 0.1, 0.1]))
+    plan = plan_move(solver, target, MoveLimits(waypoints=1000))
+    assert not plan.reached and plan.limiting and len(plan.waypoints) < 200
+
+
 def test_fingers_that_would_meet_limit_a_plan(solver, monkeypatch):
     """The second time that it is looked at two disks touch, as they do nowhere in this grasp."""
     gaps = iter([0.005, 0.001, 0.0])
@@ -181,6 +188,8 @@ def test_bad_values_are_named(solver):
         plan_move(solver, target, MoveLimits(pulls={"finger_1": np.zeros((1, 2))}))
     with pytest.raises(InvalidValue, match="lower pull first"):
         plan_move(solver, target, MoveLimits(pulls={"finger_2": np.array([[0.2, 0.1]])}))
+    with pytest.raises(InvalidValue, match="pose"):
+        solver.support("there")
     solver.support()
     with pytest.raises(InvalidValue, match="supported"):
         plan_move(solver, target)

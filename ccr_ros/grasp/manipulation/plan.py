@@ -27,6 +27,7 @@ _ARM = 0.02  # m; as far from its centre a turn counts as much as a shift
 _SCALE = np.array([1.0] * 3 + [_ARM] * 3)
 _ASIDE = 0.4  # weight of motions that were not asked for
 _LEAST = 0.02  # share of a step's wanted motion below which nothing gets on any more
+_IDLE, _NEARER = 8, 0.99  # waypoints that may pass without coming nearer than that share of the way
 _SHRINKS = 5  # times that a step is halved before it is given up
 
 
@@ -162,6 +163,7 @@ class _Planner:
             }
         )
         waypoints, limiting, size = [first], "", self.limits.step
+        nearest, idle = self._far(self.way), 0
         while len(waypoints) <= self.limits.waypoints:
             left = self.way - waypoints[-1].moved
             if self._there(left):
@@ -173,6 +175,12 @@ class _Planner:
             solution, size = found
             waypoints.append(self._waypoint(solution))
             size = min(self.limits.step, 2 * size)
+            far = self._far(self.way - waypoints[-1].moved)
+            idle = idle + 1 if far > _NEARER * nearest else 0
+            nearest = min(nearest, far)
+            if idle >= _IDLE:
+                limiting = "no pull brings the object nearer to all that was asked for"
+                break
             limiting = (yield waypoints[-1]) or ""
             if limiting:
                 break
@@ -180,11 +188,19 @@ class _Planner:
             limiting = f"the number of waypoints: {self.limits.waypoints} at most"
         return self._plan(waypoints, False, limiting)
 
-    def _there(self, left: np.ndarray) -> bool:
+    def _missing(self, left: np.ndarray) -> tuple[float, float]:
+        """How much of the shift [m] and of the turn [rad] that were asked for is left."""
         asked_shift, asked_turn = np.any(self.target.shift), np.any(self.target.turn)
         far = float(np.linalg.norm(left[:3])) if asked_shift else 0.0
         # Of a turn, what counts is how far it has come about the axis asked for.
-        turn = abs(float(left[3:] @ _unit(self.target.turn))) if asked_turn else 0.0
+        return far, abs(float(left[3:] @ _unit(self.target.turn))) if asked_turn else 0.0
+
+    def _far(self, left: np.ndarray) -> float:
+        far, turn = self._missing(left)
+        return float(np.hypot(far, _ARM * turn))
+
+    def _there(self, left: np.ndarray) -> bool:
+        far, turn = self._missing(left)
         return far <= self.target.shift_tolerance and turn <= self.target.turn_tolerance
 
     def _step(

@@ -114,7 +114,7 @@ class Path:
             heavier = float(np.linalg.norm(load - begin_load))
             fine = min(fine, _LOAD_STEP * max(grip, 1e-6) / max(heavier, 1e-12))
             fine = max(fine, _SMALLEST_STEP)
-        done, smallest = 0.0, min(_SMALLEST_STEP, fine / 16 if rough else 1.0)
+        done, smallest = 0.0, min(_SMALLEST_STEP, fine / 64 if rough else 1.0)
         self._deadline = time.thread_time() + self.settings.time_limit
         while done < 1.0:
             if rough and self._touches(way.point):

@@ -175,8 +175,13 @@ class GraspSolver:
         """Hold the object from now on where it is, or at another pose.
 
         Put at another pose the object has no friction with what touches it there until that moves.
+
+        Raises:
+            InvalidValue: It is no pose.
         """
         if pose is not None:
+            if not isinstance(pose, Pose):
+                raise InvalidValue("pose", pose, "a Pose in the gripper's frame")
             self.body = replace(self.body, pose=pose)
             self._point = None
         if self.body.friction > 0 and self._point is not None:
