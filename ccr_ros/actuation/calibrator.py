@@ -166,6 +166,7 @@ class Calibrator:
         Args:
             samples: Wound lengths and tensions (k, 2) [m], [N], from slack to taut.
         """
+        low_end, high_end = samples[:, 0].min(), samples[:, 0].max()
         top = int(np.argmax(samples[:, 1])) + 1  # beyond it the servo was turning
         wound, rise = samples[:top, 0], samples[:top, 1] - self._ground
         low = np.flatnonzero(rise < _LOW * self._settings.threshold)
@@ -179,4 +180,6 @@ class Calibrator:
         slope, _ = np.polyfit(wound, rise, 1)
         if slope <= 0.0:
             return float(wound[0])
-        return float(wound.mean() - rise.mean() / slope)
+        # Efforts that are told seldom make steps; a line along one of them leads anywhere.
+        taut = wound.mean() - rise.mean() / slope
+        return float(np.clip(taut, low_end - (high_end - low_end), high_end))

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from racks import Bench, joint
 
-from ccr_ros.actuation.calibrator import CalibrationSettings
+from ccr_ros.actuation.calibrator import CalibrationSettings, Calibrator
 from ccr_ros.actuation.drivers.loopback import LoopbackSettings
 from ccr_ros.actuation.faults import FaultCode
 from ccr_ros.actuation.rack import ServoRack
@@ -197,3 +197,14 @@ def test_only_an_active_bridge_calibrates():
         bench.bridge.calibrate([], lambda *_: None)
     with pytest.raises(Refused, match="CALIBRATING"):
         bench.command(thumb=0.001)
+
+
+def test_efforts_that_are_told_seldom_lead_no_farther_than_what_was_wound():
+    """A line along a step has no slope but that of rounding, and would end anywhere."""
+    calibrator = Calibrator([], CalibrationSettings())
+    calibrator._ground = 0.0
+    wound = np.linspace(0.0, 0.002, 21)
+    tensions = np.where(wound < 0.0009, 0.0, 0.1)
+    tensions[10:19] += np.linspace(0.0, 1e-9, 9)  # as good as level
+    tensions[-1] = 0.34
+    assert -0.002 <= calibrator._taut(np.column_stack([wound, tensions])) <= 0.002
