@@ -27,7 +27,7 @@ _ARM = 0.02  # m; as far from its centre a turn counts as much as a shift
 _SCALE = np.array([1.0] * 3 + [_ARM] * 3)
 _ASIDE = 0.4  # weight of motions that were not asked for
 _LEAST = 0.02  # share of a step's wanted motion below which nothing gets on any more
-_IDLE, _NEARER = 8, 0.99  # waypoints that may pass without coming nearer than that share of the way
+_IDLE, _NEARER = 40, 1e-4  # waypoints in which it must come that much nearer [m], a turn at _ARM
 _SHRINKS = 5  # times that a step is halved before it is given up
 
 
@@ -176,8 +176,7 @@ class _Planner:
             waypoints.append(self._waypoint(solution))
             size = min(self.limits.step, 2 * size)
             far = self._far(self.way - waypoints[-1].moved)
-            idle = idle + 1 if far > _NEARER * nearest else 0
-            nearest = min(nearest, far)
+            nearest, idle = (far, 0) if far < nearest - _NEARER else (nearest, idle + 1)
             if idle >= _IDLE:
                 limiting = "no pull brings the object nearer to all that was asked for"
                 break

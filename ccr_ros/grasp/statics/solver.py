@@ -145,8 +145,7 @@ class GraspSolver:
         """Take the object's support away, in steps: what it carried fades out.
 
         Where that leaves no equilibrium near, the object sinks slowly to the next one. Where the
-        fingers cannot hold the object the solution has not converged and the support
-        stays.
+        fingers cannot hold the object the solution has not converged and the support stays.
 
         Raises:
             InvalidValue: Nothing was solved before.
