@@ -98,8 +98,11 @@ def test_unknown_names_list_those_there_are(layout):
 
 
 @pytest.mark.parametrize("path", ["no/such.yaml", "/no/such/file", "../helical.yaml"])
-def test_missing_paths_are_not_taken_for_names(layout, path):
+def test_missing_paths_are_not_taken_for_names(layout, tmp_path, monkeypatch, path):
     layout("src", "src")
+    here = tmp_path / "empty" / "folder"  # whatever lies around where the tests are run
+    here.mkdir(parents=True)
+    monkeypatch.chdir(here)
     with pytest.raises(InvalidFile, match="no such file"):
         resources.find_config(path)
 
