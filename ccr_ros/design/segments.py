@@ -20,8 +20,8 @@ from functools import lru_cache
 import casadi as ca
 import numpy as np
 
-from ..model.equilibrium import rest_coordinates
 from ..model.finger import Finger
+from ..model.kinematics import rest_coordinates
 from ..model.rod import Arc, Buffered
 from ..model.rotation import cross
 from ..model.settings import SolverSettings

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -76,11 +76,12 @@ def make_solution(
     walk: Walk,
     elapsed: Callable[[], float],
     verdict: tuple[bool, float] | None = None,
+    names: Sequence[str] | None = None,
 ) -> Solution:
     """Assemble the solution that a walk towards ``pulls`` (m,) has ended at.
 
     ``verdict``: whether it is stable, and the smallest eigenvalue, where that is not the finger's
-    own affair.
+    own affair; ``names``: of the obstacles, where they are not the problem's.
     """
     point = walk.point
     finger, at, length = problem.finger, point.at, problem.finger.length
@@ -93,7 +94,7 @@ def make_solution(
     z = at.z / problem.rod_step
     arcs = (finger.segments, problem.arcs_per_segment, problem.rod.order + 1, 3)
     metres = at.points * length
-    names = finger.cable_names
+    cables = finger.cable_names
     cable_error, penetration = _errors(problem, point, walk.pulls)
     converged = walk.reached is None
     certificate = Certificate(
@@ -114,10 +115,12 @@ def make_solution(
         pulls=pulls,
         backbone=metres[problem.points.backbone],
         frames=at.rod.rotations[disks],
-        cables={n: metres[i] for n, i in zip(names, problem.points.cable, strict=True)},
-        antagonists={n: metres[i] for n, i in zip(names, problem.points.antagonist, strict=True)},
+        cables={n: metres[i] for n, i in zip(cables, problem.points.cable, strict=True)},
+        antagonists={n: metres[i] for n, i in zip(cables, problem.points.antagonist, strict=True)},
         tensions=_carried(point.tensions)[problem.base_group] * force_unit,
-        contacts=_contacts(problem, point, force_unit),
+        contacts=_contacts(
+            problem, point, force_unit, names or [o.name for o in problem.obstacles]
+        ),
         energy=0.5 * float(at.y @ at.y) * finger.bending_stiffness / length,
         curvature=z.reshape(arcs) / length,
         certificate=certificate,
@@ -136,7 +139,9 @@ def _errors(problem: EquilibriumProblem, point: KktPoint, pulls: np.ndarray) -> 
     return float(error.max()) * length, max(0.0, float(inside.max(initial=0.0))) * length
 
 
-def _contacts(problem: EquilibriumProblem, point: KktPoint, unit: float) -> tuple[Contact, ...]:
+def _contacts(
+    problem: EquilibriumProblem, point: KktPoint, unit: float, names: Sequence[str]
+) -> tuple[Contact, ...]:
     count = len(point.tensions)
     contacts = []
     for k in np.flatnonzero(point.active[count:]):
@@ -147,7 +152,7 @@ def _contacts(problem: EquilibriumProblem, point: KktPoint, unit: float) -> tupl
                 disk=label.disk,
                 point=label.point,
                 cable=label.cable,
-                obstacle=problem.obstacles[obstacle].name,
+                obstacle=names[obstacle],
                 position=point.at.points[index] * problem.finger.length,
                 normal=point.normals[k],
                 force=float(point.multipliers[count + k]) * unit,

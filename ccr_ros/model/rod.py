@@ -137,8 +137,8 @@ class Buffered:
 
 
 @lru_cache(maxsize=32)
-def _functions(arcs: int, order: int) -> tuple[ca.Function, ca.Function]:
-    """The chain of arcs with its twists, and the arcs' contracted second derivatives."""
+def _functions(arcs: int, order: int, rods: int) -> tuple[ca.Function, ca.Function]:
+    """The chains of arcs with their twists, and the arcs' contracted second derivatives."""
     arc, state = Arc(order, 1.0 / arcs), ca.SX.sym("state", 12)
     z = arc.z
     r0, p0 = ca.reshape(state[:9], 3, 3), state[9:]
@@ -154,12 +154,13 @@ def _functions(arcs: int, order: int) -> tuple[ca.Function, ca.Function]:
     force, moment = ca.SX.sym("force", 3), ca.SX.sym("moment", 3, 3)
     hessian = ca.densify(arc.in_z(arc.hessian_in_z(arc.work(force, moment))))
     second = ca.Function("second", [z, force, moment], [hessian])
-    return step.mapaccum("chain", arcs), second.map(arcs)
+    chain = step.mapaccum("chain", arcs)
+    return chain if rods == 1 else chain.map(rods), second.map(rods * arcs)
 
 
 @dataclass(frozen=True, eq=False)
 class RodState:
-    """The rod at one set of arc coordinates.
+    """The rod at one set of arc coordinates; of several rods, all arrays have a leading axis.
 
     Attributes:
         rotations: (E+1, 3, 3) frame at each arc's ends, base first; columns are the axes.
@@ -177,31 +178,38 @@ class Rod:
     """A chain of ``arcs`` equal arcs, of unit total length, clamped at the origin along +z.
 
     Arc coordinates ``z`` (arcs, 3 (order + 1)) are h a (and h b) of each arc [rad].
+
+    Args:
+        arcs: How many.
+        order: Of their curvature.
+        rods: Evaluate so many like rods at once: all arrays then have a leading axis; None: one.
     """
 
-    def __init__(self, arcs: int, order: int) -> None:
+    def __init__(self, arcs: int, order: int, rods: int | None = None) -> None:
         self.arcs = arcs
         self.order = order
         self.size = 3 * (order + 1)
-        chain, second = _functions(arcs, order)
+        self._lead = () if rods is None else (rods,)
+        chain, second = _functions(arcs, order, rods or 1)
         self._chain, self._second = Buffered(chain), Buffered(second)
-        self._chain.inputs[0][:] = [1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0]
+        start = self._chain.inputs[0].reshape(-1, 12)
+        start[:, [0, 4, 8]] = 1.0
         # arc index of each coordinate: the upper triangle of pairs of coordinates of unlike arcs
         arc = np.repeat(np.arange(arcs), self.size)
-        self._diagonal = np.arange(arcs)
         self._earlier = (arc[:, None] < arc[None, :]).astype(float)
 
     def state(self, z: np.ndarray) -> RodState:
         """Evaluate frames, positions and twists at arc coordinates ``z``."""
+        lead, arcs = self._lead, self.arcs
         self._chain.inputs[1][:] = z.ravel()
         self._chain()
-        states = self._chain.outputs[0].reshape(self.arcs, 12)
-        rotations = np.empty((self.arcs + 1, 3, 3))
-        positions = np.zeros((self.arcs + 1, 3))
-        rotations[0] = _EYE
-        rotations[1:] = states[:, :9].reshape(-1, 3, 3).transpose(0, 2, 1)
-        positions[1:] = states[:, 9:]
-        return RodState(rotations, positions, self._chain.outputs[1].reshape(-1, 6).copy())
+        states = self._chain.outputs[0].reshape(*lead, arcs, 12)
+        rotations = np.empty((*lead, arcs + 1, 3, 3))
+        positions = np.zeros((*lead, arcs + 1, 3))
+        rotations[..., 0, :, :] = _EYE
+        rotations[..., 1:, :, :] = states[..., :9].reshape(*lead, arcs, 3, 3).swapaxes(-1, -2)
+        positions[..., 1:, :] = states[..., 9:]
+        return RodState(rotations, positions, self._chain.outputs[1].reshape(*lead, -1, 6).copy())
 
     def curvature_hessian(
         self,
@@ -224,24 +232,25 @@ class Rod:
         beyond e, contracted to omega_e . (v_f x F + (M' - tr M) omega_f), M = sum F x^T; for two
         of the same arc the arc's own second derivatives, contracted.
         """
-        arms = (loads @ _ARMS).reshape(-1, 6, 3)
-        arm = (scaled.reshape(self.arcs, self.size, 6) @ arms).reshape(-1, 3)
-        hessian = scaled[:, :3] @ arm.T
+        lead, arcs, size = self._lead, self.arcs, self.size
+        arms = (loads @ _ARMS).reshape(*lead, arcs, 6, 3)
+        arm = (scaled.reshape(*lead, arcs, size, 6) @ arms).reshape(*lead, -1, 3)
+        hessian = scaled[..., :3] @ arm.swapaxes(-1, -2)
         hessian *= self._earlier
-        hessian += hessian.T.copy()
+        hessian += hessian.swapaxes(-1, -2).copy()
 
-        force, moment = loads[:, None, :3], loads[:, 3:].reshape(-1, 3, 3)
-        before = state.rotations[:-1]
-        lever = moment - loads[:, :3, None] * state.positions[1:, None, :]
-        local = before.transpose(0, 2, 1) @ lever @ state.rotations[1:]
+        force, moment = loads[..., None, :3], loads[..., 3:].reshape(*lead, arcs, 3, 3)
+        before = state.rotations[..., :-1, :, :]
+        lever = moment - loads[..., :3, None] * state.positions[..., 1:, None, :]
+        local = before.swapaxes(-1, -2) @ lever @ state.rotations[..., 1:, :, :]
         self._second.inputs[0][:] = z.ravel()
         self._second.inputs[1][:] = (force @ before).ravel()
-        self._second.inputs[2][:] = local.transpose(0, 2, 1).ravel()
+        self._second.inputs[2][:] = local.swapaxes(-1, -2).ravel()
         self._second()
-        blocks = self._second.outputs[0].reshape(-1, self.size, self.size)
-        hessian.reshape(self.arcs, self.size, self.arcs, self.size)[
-            self._diagonal, :, self._diagonal, :
-        ] += blocks * (scale[:, None] * scale)
+        blocks = self._second.outputs[0].reshape(*lead, arcs, size, size)
+        # The arcs' own blocks, as a view.
+        own = np.einsum("...eaeb->...eab", hessian.reshape(*lead, arcs, size, arcs, size))
+        own += blocks * (scale[..., None, :, None] * scale[..., None, None, :])
         return hessian
 
 

@@ -14,10 +14,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .equilibrium import EquilibriumProblem, Evaluation, Linearization
+from .equilibrium import EquilibriumProblem, Evaluation
+from .kinematics import Linearization
 from .qp import solve_multipliers
 
-_BAND = 0.1  # points nearer to an obstacle than this (units of L) enter the QP
+BAND = 0.1  # points nearer to an obstacle than this (units of L) enter the QP
 _AUGMENT = 10.0  # weight of the active constraints' augmentation, in units of the rod's stiffness
 ACTIVE = 1e-9  # multipliers (T L^2 / EI) above this carry force
 
@@ -48,7 +49,7 @@ class KktPoint:
         values: (C + c,) constraint values: lengths, and negative distances.
         multipliers: (C + c,) tensions and the candidates' forces.
         hessian: (N, N) Hessian of the Lagrangian, exact.
-        unbalanced: (N,) generalised forces left over, without ``pushes`` (see `derive`).
+        unbalanced: (N,) generalised forces left over, but for friction.
         residual: Largest unbalanced generalised force, relative to the largest elastic one or 1.
     """
 
@@ -123,12 +124,8 @@ def derive(
     at: Evaluation,
     tensions: np.ndarray,
     forces: np.ndarray,
-    pushes: np.ndarray | None = None,
 ) -> KktPoint:
-    """Return the KKT point of a pose with multipliers: all derivatives and the residual.
-
-    ``pushes`` (P, 3), if any, are in the Hessian and not in the residual.
-    """
+    """Return the KKT point of a pose with multipliers: all derivatives and the residual."""
     first = problem.linearize(at)
     pairs = _candidates(problem, at, forces)
     normals, curvatures, pressing = _NO_NORMALS, _NO_CURVATURES, _NO_FORCES
@@ -140,7 +137,7 @@ def derive(
         rows = np.concatenate([rows, contact])
         values = np.concatenate([values, -at.distances[index]])
         multipliers = np.concatenate([tensions, pressing])
-    hessian = problem.hessian(at, first, tensions, pairs, normals, curvatures, pressing, pushes)
+    hessian = problem.hessian(at, first, tensions, pairs, normals, curvatures, pressing)
     unbalanced = at.y + multipliers @ rows
     residual = float(np.abs(unbalanced).max() / max(1.0, np.abs(at.y).max()))
     return KktPoint(
@@ -153,7 +150,7 @@ def _candidates(problem: EquilibriumProblem, at: Evaluation, forces: np.ndarray)
     """Pairs (c, 2) of obstacle and point that are near each other or press on each other."""
     if not problem.obstacles:
         return _NO_PAIRS
-    near = (at.distances < _BAND) | (forces > 0)
+    near = (at.distances < BAND) | (forces > 0)
     near[:, problem.fixed] = False
     return np.argwhere(near)
 

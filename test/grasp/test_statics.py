@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from ccr_ros.grasp.statics import Body, GraspSolver, sphere_body
-from ccr_ros.grasp.statics.assembly import block, gather
+from ccr_ros.grasp.statics.assembly import derive, gather
 from ccr_ros.grasp.statics.path import displaced
+from ccr_ros.grasp.statics.stack import Guess
 from ccr_ros.model import (
     Box,
     InvalidValue,
@@ -158,7 +159,7 @@ def test_a_box_pressed_and_turned_has_the_derivatives_that_differences_give(fing
     problem = hand.problems[0]
     y = 0.02 * rng.standard_normal(problem.size)
     none = np.zeros((1, len(problem.points.labels)))
-    free = block(hand, 0, body, pose, y, np.zeros(1), none)
+    (free,) = derive(hand, body, pose, [Guess(y, np.zeros(1), none)])
     forces = none.copy()
     near = free.point.pairs[:, 1]
     assert len(near) > 2
@@ -166,7 +167,8 @@ def test_a_box_pressed_and_turned_has_the_derivatives_that_differences_give(fing
     tension = np.array([1.7])
 
     def gradient(dy, dq):
-        part = block(hand, 0, body, displaced(pose, dq, hand.length), y + dy, tension, forces)
+        there = displaced(pose, dq, hand.length)
+        (part,) = derive(hand, body, there, [Guess(y + dy, tension, forces)])
         found = {int(k): i for i, k in enumerate(part.point.pairs[:, 1])}
         rows = [0, *(1 + found[int(k)] for k in near)]
         force = np.concatenate([tension, forces[0, near]])

@@ -22,21 +22,20 @@ the surface (`friction`), to which the same formulas apply with H = 0.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ccr_ros.model.equilibrium import EquilibriumProblem
 from ccr_ros.model.files import MountedFinger
-from ccr_ros.model.rotation import Pose, cross, skew
+from ccr_ros.model.rotation import Pose
 from ccr_ros.model.settings import SolverSettings
-from ccr_ros.model.sqp import KktPoint, derive
+from ccr_ros.model.sqp import KktPoint
 
 from .body import Body
-from .friction import FrictionRows, Hold, friction_rows, pushes_in_base
-
-_EYE = np.eye(3)
+from .friction import FrictionRows, Hold, Touching, friction_rows
+from .stack import Derived, Guess, Stack
 
 
 class Hand:
@@ -47,6 +46,7 @@ class Hand:
         problems: One per finger.
         weights: (F,) EI / L of each finger relative to the first one's.
         energy: EI / L of the first finger [J]; length: its length [m]: the units.
+        alike: Indices of fingers that are evaluated at once; stacks: what does it.
     """
 
     def __init__(
@@ -61,20 +61,29 @@ class Hand:
             [m.finger.bending_stiffness / m.finger.length / self.energy for m in fingers]
         )
         self._to_base = [m.base.inverse() for m in fingers]
-        self._frames = []
-        for mounted in self.mounted:
-            frame, turn = np.zeros((6, 6)), mounted.base.rotation
-            frame[:3, :3] = turn.T * (self.length / mounted.finger.length)
-            frame[3:, 3:] = turn.T
-            self._frames.append(frame)
+        like: dict[Hashable, list[int]] = {}
+        for index, problem in enumerate(self.problems):
+            like.setdefault(problem.likeness, []).append(index)
+        self.alike = tuple(tuple(members) for members in like.values())
+        self.stacks = tuple(
+            Stack(
+                [self.problems[i] for i in members],
+                [self.mounted[i] for i in members],
+                [self._frame(self.mounted[i]) for i in members],
+            )
+            for members in self.alike
+        )
 
     def in_base(self, index: int, pose: Pose) -> Pose:
         """Return a pose of the gripper's frame in the base frame of a finger."""
         return self._to_base[index] @ pose
 
-    def frame(self, index: int) -> np.ndarray:
-        """Return (6, 6) from a motion q to that in a finger's base frame and units."""
-        return self._frames[index]
+    def _frame(self, mounted: MountedFinger) -> np.ndarray:
+        """(6, 6) from a motion q to that in a finger's base frame and units."""
+        frame, turn = np.zeros((6, 6)), mounted.base.rotation
+        frame[:3, :3] = turn.T * (self.length / mounted.finger.length)
+        frame[3:, 3:] = turn.T
+        return frame
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,26 +91,51 @@ class FingerBlock:
     """One finger's part of the problem at a point; in the finger's own units.
 
     Attributes:
-        point: The finger with the object as its last obstacle.
-        touch: (k,) of the rows in ``point.rows``, which are contacts with the object.
-        columns: (C + c, 6) of all rows with respect to q.
-        border: (N, 6) of the Hessian, finger against q.
-        corner: (6, 6) the finger's share of the Hessian of q.
+        derived: The finger, with the object as its last obstacle, but for friction.
         hold: What friction remembers, with the forces that it has here.
         friction: The contacts that have it.
-        place: The object in the finger's base frame.
         unbalanced: (N,) generalised forces left over.
     """
 
-    point: KktPoint
-    touch: np.ndarray
-    columns: np.ndarray
-    border: np.ndarray
-    corner: np.ndarray
+    derived: Derived
     hold: Hold
     friction: FrictionRows
-    place: Pose
     unbalanced: np.ndarray
+
+    @property
+    def point(self) -> KktPoint:
+        """The finger with the object as its last obstacle."""
+        return self.derived.near.point
+
+    @property
+    def touch(self) -> np.ndarray:
+        """(k,) of the rows in ``point.rows``, which are contacts with the object."""
+        return self.derived.near.touch
+
+    @property
+    def columns(self) -> np.ndarray:
+        """(C + c, 6) of all rows with respect to q."""
+        return self.derived.columns
+
+    @property
+    def border(self) -> np.ndarray:
+        """(N, 6) of the Hessian, finger against q."""
+        return self.derived.border
+
+    @property
+    def corner(self) -> np.ndarray:
+        """(6, 6) the finger's share of the Hessian of q."""
+        return self.derived.corner
+
+    @property
+    def turn(self) -> np.ndarray:
+        """(3, 3) the object's orientation in the finger's base frame."""
+        return self.derived.near.turn
+
+    @property
+    def centre(self) -> np.ndarray:
+        """(3,) the object's centre in the finger's base frame and units."""
+        return self.derived.near.centre
 
     def on_object(self) -> np.ndarray:
         """(6,) force and moment that the finger leaves over on the object, in its own units."""
@@ -130,113 +164,42 @@ class GraspPoint:
     residual: float
 
 
-def block(
-    hand: Hand,
-    index: int,
-    body: Body,
-    pose: Pose,
-    y: np.ndarray,
-    tensions: np.ndarray,
-    forces: np.ndarray,
-    hold: Hold | None = None,
-) -> FingerBlock:
-    """Return one finger's part, at coordinates y (N,), with multipliers in its own units.
+def derive(hand: Hand, body: Body, pose: Pose, guesses: Sequence[Guess]) -> list[FingerBlock]:
+    """Return each finger's part of the problem.
 
     Args:
         hand: The fingers.
-        index: Which of them.
         body: The object.
         pose: Of the object in the gripper.
-        y: The finger's coordinates.
-        tensions: (C,) multipliers of its cable lengths.
-        forces: (O, P) multipliers of its contacts; the last row is the object's.
-        hold: What friction remembers of it, with its forces; None: nothing.
+        guesses: One per finger.
     """
-    problem = hand.problems[index]
-    local = hand.in_base(index, pose)
-    own = problem.finger.obstacles
-    problem.obstacles = (*own, body.shape.moved(local))
-    hold = Hold.none(len(problem.points.labels)) if hold is None else hold
-    pushes = pushes_in_base(hold, local.rotation, forces[-1]) if body.friction > 0 else None
-    point = derive(problem, problem.evaluate(y), tensions, forces, pushes)
-    lengths = len(point.tensions)
-    touch = np.flatnonzero(point.pairs[:, 0] == len(own))
-    columns = np.zeros((len(point.rows), 6))
-    border, corner = np.zeros((problem.size, 6)), np.zeros((6, 6))
-    frame = hand.frame(index)
-    if len(touch):
-        where = point.pairs[touch, 1]
-        arms = point.at.points[where] - local.position / problem.finger.length
-        normals = point.normals[touch]
-        pushed = np.concatenate([normals, cross(arms, normals)], axis=1)
-        columns[lengths + touch] = pushed @ frame
-        pressed = np.flatnonzero(point.multipliers[lengths + touch] > 0)
-        if len(pressed):
-            force = point.multipliers[lengths + touch[pressed]]
-            whole = force[:, None] * normals[pressed]
-            if pushes is not None:
-                whole = whole + pushes[where[pressed]]
-            _second_order(
-                point.first.points[where[pressed]], point.curvatures[touch[pressed]],
-                arms[pressed], force, whole, border, corner,
-            )  # fmt: skip
-            border, corner = border @ frame, frame.T @ corner @ frame
-    parts = (point, lengths + touch, columns, border, corner)
-    return _with_friction(hand, index, body, parts, hold, local)
+    found: list[Derived | None] = [None] * len(guesses)
+    for members, stack in zip(hand.alike, hand.stacks, strict=True):
+        for index, one in zip(
+            members, stack.derive(body, pose, [guesses[i] for i in members]), strict=True
+        ):
+            found[index] = one
+    derived = [one for one in found if one is not None]
+    return _with_friction(derived, [one.near for one in derived], body)
 
 
-def held_anew(hand: Hand, index: int, body: Body, part: FingerBlock, hold: Hold) -> FingerBlock:
-    """Return a finger's part where friction remembers something else and forces are the same."""
-    parts = (part.point, part.touch, part.columns, part.border, part.corner)
-    return _with_friction(hand, index, body, parts, hold, part.place)
+def held_anew(body: Body, parts: Sequence[FingerBlock], holds: Sequence[Hold]) -> list[FingerBlock]:
+    """Return the fingers where friction remembers something else and all forces are the same."""
+    near = [replace(p.derived.near, hold=hold) for p, hold in zip(parts, holds, strict=True)]
+    return _with_friction([p.derived for p in parts], near, body)
 
 
 def _with_friction(
-    hand: Hand,
-    index: int,
-    body: Body,
-    parts: tuple[KktPoint, np.ndarray, np.ndarray, np.ndarray, np.ndarray],
-    hold: Hold,
-    place: Pose,
-) -> FingerBlock:
-    point, touch = parts[:2]
-    centre = place.position / hand.problems[index].finger.length
-    rows = friction_rows(
-        point, touch, hold, body.friction, centre, place.rotation, hand.frame(index)
-    )
-    unbalanced = point.unbalanced
-    if len(rows):
-        along = rows.rows.reshape(-1, len(unbalanced))
-        unbalanced = unbalanced + rows.forces.ravel() @ along
-    return FingerBlock(*parts, hold, rows, place, unbalanced)
-
-
-def _second_order(
-    jacobian: np.ndarray,
-    curvatures: np.ndarray,
-    arms: np.ndarray,
-    force: np.ndarray,
-    whole: np.ndarray,
-    border: np.ndarray,
-    corner: np.ndarray,
-) -> None:
-    """Add the second derivatives of -force x distance to border and corner, base frame.
-
-    ``whole`` (k, 3) are the contacts' forces on the finger, friction included.
-    """
-    hessians = curvatures * force[:, None, None]
-    motion = np.empty((len(arms), 3, 6))  # of u by q
-    motion[:, :, :3], motion[:, :, 3:] = -_EYE, skew(arms)
-    bent = hessians @ motion
-    by_point = bent.copy()
-    by_point[:, :, 3:] -= skew(whole)
-    border -= jacobian.reshape(-1, jacobian.shape[2]).T @ by_point.reshape(-1, 6)
-    corner -= motion.reshape(-1, 6).T @ bent.reshape(-1, 6)
-    turned = skew(whole.sum(axis=0))
-    corner[:3, 3:] -= turned
-    corner[3:, :3] -= turned.T
-    outer = whole.T @ arms
-    corner[3:, 3:] -= 0.5 * (outer + outer.T) - np.trace(outer) * _EYE
+    derived: Sequence[Derived], near: Sequence[Touching], body: Body
+) -> list[FingerBlock]:
+    parts = []
+    for one, touching, rows in zip(derived, near, friction_rows(near, body.friction), strict=True):
+        unbalanced = touching.point.unbalanced
+        if len(rows):
+            along = rows.rows.reshape(-1, len(unbalanced))
+            unbalanced = unbalanced + rows.forces.ravel() @ along
+        parts.append(FingerBlock(one, touching.hold, rows, unbalanced))
+    return parts
 
 
 def gather(

@@ -17,6 +17,7 @@ A point that comes to touch within a step has no friction in that step.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -26,6 +27,7 @@ from ccr_ros.model.rotation import cross
 from ccr_ros.model.sqp import ACTIVE, KktPoint
 
 RHO = 100.0  # force per way, in units of EI / L^3; about thirty times a finger's own stiffness
+_EYE = np.eye(3)
 _EDGE = 1e-6  # relative; a friction force as near to the cone's border as that slips on
 
 
@@ -100,29 +102,15 @@ class FrictionRows:
 
 def tangents_of(normals: np.ndarray) -> np.ndarray:
     """Return (g, 2, 3) unit tangents, normal to each other, for unit normals (g, 3)."""
-    least = np.eye(3)[np.argmin(np.abs(normals), axis=1)]
+    least = _EYE[np.argmin(np.abs(normals), axis=1)]
     first = cross(normals, least)
-    first /= np.linalg.norm(first, axis=1)[:, None]
+    first /= np.sqrt(np.einsum("gi,gi->g", first, first))[:, None]
     return np.stack([first, cross(normals, first)], axis=1)
 
 
-def _times(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """Return (g, 2) of matrices (g, 2, 3) and vectors (g, 3), one each."""
+def _turned(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Return the products of matrices (g, m, 3) and vectors (g, 3), one each."""
     return (matrices @ vectors[:, :, None])[:, :, 0]
-
-
-def pushes_in_base(hold: Hold, turn: np.ndarray, forces: np.ndarray) -> np.ndarray | None:
-    """Friction forces (P, 3) on the finger in its base frame, of points that press, or None.
-
-    Args:
-        hold: What friction remembers.
-        turn: (3, 3) the object's orientation in the base frame.
-        forces: (P,) normal forces.
-    """
-    pressed = hold.anchored & (forces > ACTIVE)
-    if not pressed.any():
-        return None
-    return np.where(pressed[:, None], hold.pushes @ turn.T, 0.0)
 
 
 @lru_cache(maxsize=16)
@@ -135,53 +123,88 @@ def _none(size: int) -> FrictionRows:
     )  # fmt: skip
 
 
-def friction_rows(
-    point: KktPoint,
-    touch: np.ndarray,
-    hold: Hold,
-    friction: float,
-    centre: np.ndarray,
-    turn: np.ndarray,
-    frame: np.ndarray,
-) -> FrictionRows:
-    """Return the contacts that have friction.
+@dataclass(frozen=True, eq=False)
+class Touching:
+    """A finger that is near the object, as `friction_rows` wants it.
 
-    Args:
+    Attributes:
         point: The finger.
         touch: (k,) its rows that are contacts with the object.
         hold: What friction remembers.
-        friction: Its coefficient mu.
         centre: (3,) the object's, in the base frame and the finger's units.
         turn: (3, 3) the object's orientation in the base frame.
         frame: (6, 6) from q to the object's motion in base frame and finger's units.
     """
-    if friction <= 0 or not len(touch):
-        return _none(point.rows.shape[1])
-    lengths = len(point.tensions)
-    where = point.pairs[touch - lengths, 1]
-    held = hold.anchored[where] & (point.multipliers[touch] > ACTIVE)
-    index, where = touch[held], where[held]
-    if not len(index):
-        return _none(point.rows.shape[1])
-    tangents = tangents_of(point.normals[index - lengths])
-    arms = point.at.points[where] - centre
-    ways = -_times(tangents, arms - hold.anchors[where] @ turn.T)
-    forces = _times(tangents, hold.pushes[where] @ turn.T)
-    moved = np.concatenate([tangents, cross(arms[:, None, :], tangents)], axis=2)
-    limits = friction * point.multipliers[index]
-    size_of = np.linalg.norm(forces + RHO * ways, axis=1)
-    edge = np.where(hold.slipping[where], -_EDGE, 1e-12)
-    return FrictionRows(
-        index=index,
-        where=where,
-        tangents=tangents,
-        rows=-tangents @ point.first.points[where],
-        columns=moved @ frame,
-        ways=ways,
-        forces=forces,
-        limits=limits,
-        slips=size_of > limits * (1 + edge),
-    )
+
+    point: KktPoint
+    touch: np.ndarray
+    hold: Hold
+    centre: np.ndarray
+    turn: np.ndarray
+    frame: np.ndarray
+
+    def held(self) -> np.ndarray:
+        """(g,) rows of the contacts that have friction."""
+        pressed = self.touch[self.point.multipliers[self.touch] > ACTIVE]
+        return pressed[self.hold.anchored[self.where(pressed)]]
+
+    def where(self, rows: np.ndarray) -> np.ndarray:
+        """(g,) points of contacts, given by their rows."""
+        return self.point.pairs[rows - len(self.point.tensions), 1]
+
+
+def friction_rows(fingers: Sequence[Touching], friction: float) -> list[FrictionRows]:
+    """Return each finger's contacts that have friction, of coefficient mu.
+
+    The contacts of all fingers are gone through at once.
+    """
+    none = [_none(f.point.rows.shape[1]) for f in fingers]
+    if friction <= 0:
+        return none
+    chosen = [f.held() for f in fingers]
+    counts = [len(rows) for rows in chosen]
+    if not any(counts):
+        return none
+    places = [f.where(rows) for f, rows in zip(fingers, chosen, strict=True)]
+    by_contact = list(zip(fingers, chosen, places, strict=True))
+    normals = np.concatenate([f.point.normals[i - len(f.point.tensions)] for f, i, _ in by_contact])
+    arms = np.concatenate([f.point.at.points[w] - f.centre for f, _, w in by_contact])
+    turns = np.repeat([f.turn for f in fingers], counts, axis=0)
+    frames = np.repeat([f.frame for f in fingers], counts, axis=0)
+    anchors = _turned(turns, np.concatenate([f.hold.anchors[w] for f, _, w in by_contact]))
+    pushes = _turned(turns, np.concatenate([f.hold.pushes[w] for f, _, w in by_contact]))
+    pressing = np.concatenate([f.point.multipliers[i] for f, i, _ in by_contact])
+    slipping = np.concatenate([f.hold.slipping[w] for f, _, w in by_contact])
+
+    tangents = tangents_of(normals)
+    ways = -_turned(tangents, arms - anchors)
+    forces = _turned(tangents, pushes)
+    columns = np.concatenate([tangents, cross(arms[:, None, :], tangents)], axis=2) @ frames
+    limits = friction * pressing
+    trial = forces + RHO * ways
+    size = np.sqrt(np.einsum("gi,gi->g", trial, trial))
+    slips = size > limits * (1 + np.where(slipping, -_EDGE, 1e-12))
+    found, first = [], 0
+    for empty, (finger, rows, where) in zip(none, by_contact, strict=True):
+        own = slice(first, first + len(rows))
+        first += len(rows)
+        if not len(rows):
+            found.append(empty)
+            continue
+        found.append(
+            FrictionRows(
+                index=rows,
+                where=where,
+                tangents=tangents[own],
+                rows=-tangents[own] @ finger.point.first.points[where],
+                columns=columns[own],
+                ways=ways[own],
+                forces=forces[own],
+                limits=limits[own],
+                slips=slips[own],
+            )
+        )
+    return found
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 _STEPS = 60
-_ENOUGH = 1e-5  # of the eigenvalue: residual of the pair; the eigenvalue is off by its square
+_ENOUGH = 1e-8  # of the eigenvalue: residual of the pair, which bounds the error even among twins
 _EVERY = 3  # steps from one look at the residual to the next
 
 

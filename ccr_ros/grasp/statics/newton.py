@@ -24,17 +24,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from ccr_ros.model.qp import solve_multipliers
-from ccr_ros.model.sqp import Bounds, definite
+from ccr_ros.model.sqp import Bounds
 
-from .assembly import FingerBlock, GraspPoint, Hand
-from .surface import Surface, surface_of
+from .assembly import GraspPoint, Hand
+from .elimination import System, Task, eliminated, made_definite, upright
+from .surface import surface_of
 
 # Weights of the augmentation (as in ccr_ros.model.sqp), in turn until the matrix is definite; in
 # a grasp it is the others' contacts that make a finger stable, which may take more than 10. A
 # constraint that lets go is held back by its weight, so the first is low where some may.
 _AUGMENT = (10.0, 1e3, 1e5)
 _AUGMENT_HELD = (1e3, 1e5)
-_PROX = 1e-9  # of the object's own block: a ball may turn freely, and shall not
 _ROUNDING = 1e-12  # units of length
 _YIELD = 1e-8  # relative compliance of points that stick, from force to force: twins share a load
 
@@ -72,7 +72,7 @@ def newton_step(
         free: Whether the object moves; else its support holds it where it is.
         support: Stiffness of a support that gives way, in units; its force is in the load.
     """
-    task = _Task(
+    task = Task(
         hand, at, free, support,
         [part.point.slacks(bound) for part, bound in zip(at.blocks, bounds, strict=True)],
         [surface_of(part) for part in at.blocks],
@@ -85,31 +85,20 @@ def newton_step(
     return _attempt(task, [np.arange(len(part.point.rows)) for part in at.blocks], None)
 
 
-@dataclass(frozen=True, eq=False)
-class _Task:
-    """What a step is asked of: arguments of `newton_step`, all rooms, and what friction does."""
-
-    hand: Hand
-    at: GraspPoint
-    free: bool
-    support: float
-    slacks: list[np.ndarray]
-    surfaces: list[Surface]
+Solve = Callable[..., np.ndarray | None]
 
 
-def _attempt(
-    task: _Task, chosen: list[np.ndarray], solve: Callable[..., np.ndarray | None] | None
-) -> Step | None:
+def _attempt(task: Task, chosen: list[np.ndarray], solve: Solve | None) -> Step | None:
     """The step with some of each finger's lengths and normals; their forces by ``solve``."""
     for weight in _AUGMENT if solve is None else _AUGMENT_HELD:
-        checked = definite if weight == _AUGMENT[-1] else _upright
-        system = _eliminated(task, chosen, weight, checked)
+        checked = made_definite if weight == _AUGMENT[-1] else upright
+        system = eliminated(task, chosen, weight, checked)
         if system is not None:
             return _solved(task, chosen, system, solve or solve_multipliers)
     return None
 
 
-def _keeps_off(task: _Task, step: Step) -> bool:
+def _keeps_off(task: Task, step: Step) -> bool:
     """Whether a step violates none of the constraints that carry no force."""
     for part, slack, way, pushed in zip(
         task.at.blocks, task.slacks, step.fingers, step.multipliers, strict=True
@@ -133,201 +122,78 @@ def _held(
     return forces if forces.min() >= 0 else None
 
 
-def _upright(matrix: np.ndarray) -> np.ndarray | None:
-    """The matrix if it is positive definite."""
-    try:
-        np.linalg.cholesky(matrix)
-    except np.linalg.LinAlgError:
-        return None
-    return matrix
-
-
-@dataclass(frozen=True, eq=False)
-class _Eliminated:
-    """A finger after elimination: D^-1 on slope, border and forces, and its rows.
-
-    Attributes:
-        by_slope: (N,); by_q: (N, 6); by_force: (N, r).
-        left: (6, N) E.
-        rows: (r, N), columns: (r, 6): R and C; acting_q: (r, 6): G.
-        values: (r,) room of lengths and normals, or negative ways; active: (r,).
-        yields, kept: (s,) compliances, and forces that they count from.
-    """
-
-    by_slope: np.ndarray
-    by_q: np.ndarray
-    by_force: np.ndarray
-    left: np.ndarray
-    rows: np.ndarray
-    columns: np.ndarray
-    acting_q: np.ndarray
-    values: np.ndarray
-    active: np.ndarray
-    yields: np.ndarray
-    kept: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
-class _System:
-    """All fingers after elimination, and the inverse of the object's own matrix S."""
-
-    fingers: list[_Eliminated]
-    right: np.ndarray
-    inverse: np.ndarray
-
-
-def _eliminated(
-    task: _Task,
-    chosen: list[np.ndarray],
-    augment: float,
-    checked: Callable[[np.ndarray], np.ndarray | None],
-) -> _System | None:
-    corner, right = np.eye(6) * (_PROX + task.support), -task.at.load
-    fingers = []
-    for weight, part, index, room, surface in zip(
-        task.hand.weights, task.at.blocks, chosen, task.slacks, task.surfaces, strict=True
-    ):
-        point, values = part.point, np.concatenate([room[index], -surface.ways])
-        active = np.concatenate([point.active[index], np.ones(len(surface.ways), dtype=bool)])
-        changed = np.concatenate([point.rows[index], surface.rows])
-        changed_q = np.concatenate([part.columns[index], surface.columns])
-        slope, matrix, border = weight * point.at.y, weight * point.hessian, weight * part.border
-        corner = corner + weight * part.corner
-        fixed = active.copy()
-        fixed[len(index) :] = surface.sticks
-        rows, columns, target = changed[fixed], changed_q[fixed], values[fixed]
-        if len(rows):
-            size = np.einsum("ij,ij->i", rows, rows)
-            if task.free:
-                size = size + np.einsum("ij,ij->i", columns, columns)
-            raised = weight * augment / np.maximum(size, 1e-12)
-            by_row, by_column = rows.T * raised, columns.T * raised
-            matrix = matrix + by_row @ rows
-            border = border + by_row @ columns
-            corner = corner + by_column @ columns
-            slope = slope - by_row @ target
-            right = right - by_column @ target
-        solid = checked(matrix)
-        if solid is None:
-            return None
-        left = border.T
-        if surface.turning is not None:
-            size, turning = len(matrix), weight * surface.turning
-            solid = solid + turning[:size, :size]
-            border, left = border + turning[:size, size:], left + turning[size:, :size]
-            corner = corner + turning[size:, size:]
-        acting, acting_q = _acting(part, index, surface, changed, changed_q)
-        solved = np.linalg.solve(solid, np.concatenate([slope[None], border.T, acting]).T)
-        fingers.append(
-            _Eliminated(
-                by_slope=solved[:, 0],
-                by_q=solved[:, 1:7],
-                by_force=solved[:, 7:],
-                left=left,
-                rows=changed,
-                columns=changed_q,
-                acting_q=acting_q,
-                values=values,
-                active=active,
-                yields=surface.yields / weight,
-                kept=surface.forces * weight,
-            )
-        )
-    if not task.free:
-        return _System(fingers, np.zeros(6), np.zeros((6, 6)))
-    body = corner - sum(f.left @ f.by_q for f in fingers)
-    even = 0.5 * (body + body.T)
-    solid = checked(even)
-    if solid is None:
-        return None
-    right = right - sum(f.left @ f.by_slope for f in fingers)
-    return _System(fingers, right, np.linalg.inv(solid + (body - even)))
-
-
-def _acting(
-    part: FingerBlock,
-    index: np.ndarray,
-    surface: Surface,
-    changed: np.ndarray,
-    changed_q: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Rows F and G of how forces act, from R and C: a slipping contact drags along its way."""
-    slips = surface.slips
-    if not len(slips):
-        return changed, changed_q
-    acting, acting_q = changed.copy(), changed_q.copy()
-    to = np.searchsorted(index, part.friction.index[slips])
-    drag = surface.drag[slips, None, :]
-    acting[to] += (drag @ part.friction.rows[slips])[:, 0]
-    acting_q[to] += (drag @ part.friction.columns[slips])[:, 0]
-    return acting, acting_q
-
-
-def _solved(
-    task: _Task,
-    chosen: list[np.ndarray],
-    system: _System,
-    solve: Callable[..., np.ndarray | None],
-) -> Step | None:
+def _solved(task: Task, chosen: list[np.ndarray], system: System, solve: Solve) -> Step | None:
     """The step and the constraints' forces."""
-    counts = [len(f.values) for f in system.fingers]
-    total = sum(counts)
-    gram = np.zeros((total, total))
-    residual = np.concatenate([f.values for f in system.fingers])
-    first = 0
-    for f, count in zip(system.fingers, counts, strict=True):
-        own = slice(first, first + count)
-        gram[own, own] = f.rows @ f.by_force
-        residual[own] += f.rows @ f.by_slope
-        first += count
-    out, by_slope = np.zeros((total, 6)), system.inverse @ system.right
+    order = [i for stack in system.stacks for i in stack.members]
+    counts = [len(chosen[i]) + len(task.surfaces[i].ways) for i in order]
+    ends = np.cumsum([0, *counts])
+    total = int(ends[-1])
+    residual = np.concatenate([stack.residual() for stack in system.stacks])
+    gram, first = np.zeros((total, total)), 0
+    for stack in system.stacks:
+        own = slice(first, first + len(stack.real))
+        gram[own, own] = stack.gram()
+        first += len(stack.real)
+    body_step = np.zeros(6)
     if task.free:
-        reach = np.concatenate([f.columns - f.rows @ f.by_q for f in system.fingers])
-        out = np.concatenate([f.acting_q - (f.left @ f.by_force).T for f in system.fingers])
-        gram += reach @ system.inverse @ out.T
-        residual += reach @ by_slope
-    # Which rows are inequalities (lengths, normals), which are ways along the surface.
-    along = np.concatenate([np.arange(n) >= len(i) for n, i in zip(counts, chosen, strict=True)])
-    found = _forces(system, task.surfaces, gram, residual, along, solve)
+        pairs = [stack.reach() for stack in system.stacks]
+        reach = np.concatenate([out for out, _ in pairs])
+        back = np.concatenate([into for _, into in pairs])
+        by_slope = system.inverse @ system.right
+        gram += reach @ system.inverse @ back.T
+        residual = residual + reach @ by_slope
+    found = _forces(task, chosen, order, gram, residual, solve)
     if found is None or not np.isfinite(found).all():
         return None
-    body_step = -(by_slope + system.inverse @ (out.T @ found))
-    steps, multipliers, friction, first = [], [], [], 0
-    for weight, part, index, surface, f, count in zip(
-        task.hand.weights, task.at.blocks, chosen, task.surfaces, system.fingers, counts,
-        strict=True,
-    ):  # fmt: skip
-        pushed = found[first : first + count]
-        first += count
-        steps.append(-(f.by_slope + f.by_force @ pushed + f.by_q @ body_step))
-        pushed = pushed / weight
-        normal = np.zeros(len(part.point.rows))
-        normal[index] = pushed[: len(index)]
-        multipliers.append(normal)
-        across = np.einsum("s,sgi->gi", pushed[len(index) :], surface.axes)
-        friction.append(across + normal[part.friction.index, None] * surface.drag)
+    if task.free:
+        body_step = -(by_slope + system.inverse @ (back.T @ found))
+    steps: list[np.ndarray] = [body_step] * len(order)
+    first = 0
+    for stack in system.stacks:
+        pushed = found[first : first + len(stack.real)]
+        first += len(stack.real)
+        for i, step in zip(stack.members, stack.steps(pushed, body_step), strict=True):
+            steps[i] = step
     if not all(np.isfinite(step).all() for step in [*steps, body_step]):
         return None
+    multipliers, friction = [np.empty(0)] * len(order), [np.empty(0)] * len(order)
+    for i, begin, end in zip(order, ends, ends[1:], strict=False):
+        part, surface, index = task.at.blocks[i], task.surfaces[i], chosen[i]
+        own_forces = found[begin:end] / task.hand.weights[i]
+        normal = np.zeros(len(part.point.rows))
+        normal[index] = own_forces[: len(index)]
+        multipliers[i] = normal
+        across = np.einsum("s,sgi->gi", own_forces[len(index) :], surface.axes)
+        friction[i] = across + normal[part.friction.index, None] * surface.drag
     return Step(steps, body_step, multipliers, friction)
 
 
 def _forces(
-    system: _System,
-    surfaces: list[Surface],
+    task: Task,
+    chosen: list[np.ndarray],
+    order: list[int],
     gram: np.ndarray,
     residual: np.ndarray,
-    along: np.ndarray,
-    solve: Callable[..., np.ndarray | None],
+    solve: Solve,
 ) -> np.ndarray | None:
     """Forces of rows: those along the surface by elimination, the others by complementarity."""
-    active = np.concatenate([f.active for f in system.fingers])
-    if not along.any():
+    surfaces = [task.surfaces[i] for i in order]
+    active = np.concatenate([task.at.blocks[i].point.active[chosen[i]] for i in order])
+    if not any(len(s.ways) for s in surfaces):
         return solve(0.5 * (gram + gram.T), residual, active)
+    # Which rows are inequalities (lengths, normals), which are ways along the surface.
+    along = np.concatenate(
+        [
+            np.repeat([False, True], [len(chosen[i]), len(s.ways)])
+            for i, s in zip(order, surfaces, strict=True)
+        ]
+    )
     bound, way = np.flatnonzero(~along), np.flatnonzero(along)
     inner = gram[way[:, None], way]
+    weights = np.repeat(task.hand.weights[order], [len(s.ways) for s in surfaces])
     sticks = np.concatenate([s.sticks for s in surfaces])
-    yields = np.concatenate([f.yields for f in system.fingers])
-    kept = np.concatenate([f.kept for f in system.fingers])
+    yields = np.concatenate([s.yields for s in surfaces]) / weights
+    kept = np.concatenate([s.forces for s in surfaces]) * weights
     soft = np.where(sticks, _YIELD * np.maximum(np.diag(inner), 1e-12), yields)
     inner = inner + np.diag(soft)
     # residual + W m + soft (m - kept) = 0 for rows that stick; kept does not count in slip
@@ -339,8 +205,7 @@ def _forces(
     across = gram[bound[:, None], way]
     left = gram[bound[:, None], bound] - across @ solved[:, 1:]
     value = residual[bound] - across @ solved[:, 0]
-    symmetric = all(s.sticks.all() for s in surfaces)
-    pushing = solve(left, value, active[bound], symmetric)
+    pushing = solve(left, value, active, bool(sticks.all()))
     if pushing is None:
         return None
     found = np.zeros(len(residual))

@@ -14,10 +14,11 @@ from ccr_ros.model.rotation import Pose, quaternion_product
 from ccr_ros.model.settings import SolverSettings
 from ccr_ros.model.sqp import ACTIVE, Bounds, violation
 
-from .assembly import FingerBlock, GraspPoint, Hand, block, gather, held_anew
+from .assembly import FingerBlock, GraspPoint, Hand, derive, gather, held_anew
 from .body import Body
 from .friction import settle
 from .newton import Step, newton_step
+from .stack import Guess
 
 _SMALLEST_STEP = 1.0 / 256
 _LARGEST_TURN = 0.5  # rad in one arc, or of the object, in one Newton step
@@ -196,7 +197,7 @@ class Path:
         """The point with friction's memory brought up to date, and what slipped told to ``way``."""
         if self.body.friction <= 0:
             return found
-        parts = []
+        holds = []
         for index, part in enumerate(found.blocks):
             length = self.hand.problems[index].finger.length
             hold, slip = settle(
@@ -204,20 +205,17 @@ class Path:
                 part.touch,
                 part.friction,
                 way.point.blocks[index].hold,
-                part.place.position / length,
-                part.place.rotation,
+                part.centre,
+                part.turn,
             )
             way.slid[index] = way.slid[index] + slip.ways * length
             way.heat += slip.heat * float(self.hand.weights[index]) * self.hand.energy
-            parts.append(held_anew(self.hand, index, self.body, part, hold))
-        return replace(found, blocks=tuple(parts))
+            holds.append(hold)
+        return replace(found, blocks=tuple(held_anew(self.body, found.blocks, holds)))
 
     def _sticking(self, at: GraspPoint) -> GraspPoint:
-        parts = []
-        for index, part in enumerate(at.blocks):
-            hold = replace(part.hold, slipping=np.zeros_like(part.hold.slipping))
-            parts.append(held_anew(self.hand, index, self.body, part, hold))
-        return replace(at, blocks=tuple(parts))
+        holds = [replace(p.hold, slipping=np.zeros_like(p.hold.slipping)) for p in at.blocks]
+        return replace(at, blocks=tuple(held_anew(self.body, at.blocks, holds)))
 
     def _newton(
         self, way: Way, start: GraspPoint, pulls: list[np.ndarray], load: np.ndarray
@@ -226,8 +224,8 @@ class Path:
         hand, tolerance = self.hand, self.settings.tolerance
         at = gather(hand, start.pose, start.blocks, self._yielding(load, start.pose), self.free)
         bounds = [
-            Bounds(p.length_bounds(u), np.zeros((len(p.obstacles), len(p.points.labels))))
-            for p, u in zip(hand.problems, pulls, strict=True)
+            Bounds(p.length_bounds(u), np.zeros_like(part.point.forces))
+            for p, u, part in zip(hand.problems, pulls, start.blocks, strict=True)
         ]
         best, idle, torn = np.inf, 0, False
         for _ in range(self.settings.max_iterations):
@@ -275,7 +273,7 @@ class Path:
     def _moved(self, at: GraspPoint, step: Step, size: float, load: np.ndarray) -> GraspPoint:
         hand = self.hand
         pose = displaced(at.pose, size * step.body, hand.length) if self.free else at.pose
-        parts = []
+        guesses = []
         for index, part in enumerate(at.blocks):
             point, friction, hold = part.point, part.friction, part.hold
             multipliers = step.multipliers[index]
@@ -286,11 +284,11 @@ class Path:
             if self.body.friction > 0:
                 pushes = np.zeros_like(hold.pushes)
                 along = np.einsum("gi,gij->gj", step.friction[index], friction.tangents)
-                pushes[friction.where] = along @ part.place.rotation
+                pushes[friction.where] = along @ part.turn
                 hold = replace(hold, pushes=pushes)
             y = point.at.y + size * step.fingers[index]
-            tensions = multipliers[:count]
-            parts.append(block(hand, index, self.body, pose, y, tensions, forces, hold))
+            guesses.append(Guess(y, multipliers[:count], forces, hold))
+        parts = derive(hand, self.body, pose, guesses)
         return gather(hand, pose, parts, self._yielding(load, pose), self.free)
 
 

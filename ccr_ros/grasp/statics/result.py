@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -65,14 +66,14 @@ class ObjectContact:
 
 @dataclass(frozen=True, eq=False)
 class GraspSolution:
-    """Fingers and object in equilibrium.
+    """Fingers and object in equilibrium; what takes long is put together when it is asked for.
 
     Attributes:
-        fingers: One per finger, each in its base frame, the object among its obstacles; that a
-            certificate is stable says so of the whole, its eigenvalue is nan.
+        hand: The fingers as they are solved.
+        way: Where they stand.
+        target: Per finger, the pulls that were wanted [m].
         body: The object, at its pose in the gripper's frame.
         supported: Whether something beside the fingers carries the object.
-        contacts: Where fingers press on the object.
         net_force: (3,) [N] of weight, loads and contacts on the object; zero unless supported.
         net_moment: (3,) [N m] of these about its centre.
         converged: All residuals are within tolerance, and the wanted pulls and loads are reached.
@@ -86,10 +87,11 @@ class GraspSolution:
         message: What is wrong, and what to do; empty if nothing is.
     """
 
-    fingers: tuple[Solution, ...]
+    hand: Hand
+    way: Way
+    target: list[np.ndarray]
     body: Body
     supported: bool
-    contacts: tuple[ObjectContact, ...]
     net_force: np.ndarray
     net_moment: np.ndarray
     converged: bool
@@ -101,6 +103,32 @@ class GraspSolution:
     solve_time: float
     dissipated: float = 0.0
     message: str = field(default="")
+
+    @cached_property
+    def fingers(self) -> tuple[Solution, ...]:
+        """One per finger, each in its base frame, the object among its obstacles.
+
+        That a certificate is stable says so of the whole; its eigenvalue is nan.
+        """
+        way = self.way
+        return tuple(
+            make_solution(
+                problem,
+                wanted,
+                _FingerWay(_own_point(part), pulls, way.reached, way.iterations, way.substeps),
+                elapsed=lambda: self.solve_time,
+                verdict=(self.stable, math.nan),
+                names=[*(obstacle.name for obstacle in problem.finger.obstacles), self.body.name],
+            )
+            for problem, part, pulls, wanted in zip(
+                self.hand.problems, way.point.blocks, way.pulls, self.target, strict=True
+            )
+        )
+
+    @cached_property
+    def contacts(self) -> tuple[ObjectContact, ...]:
+        """Where fingers press on the object."""
+        return _contacts(self.hand, self.body, self.way)
 
     @property
     def smallest_eigenvalue(self) -> float:
@@ -150,25 +178,14 @@ def make_grasp_solution(
     at = way.point
     stability = Stability(hand, at, body, supported)
     stable = stability.exceeds(STABLE)
-    fingers = tuple(
-        make_solution(
-            problem,
-            wanted,
-            _FingerWay(_own_point(part), pulls, way.reached, way.iterations, way.substeps),
-            elapsed=lambda: elapsed,
-            verdict=(stable, math.nan),
-        )
-        for problem, part, pulls, wanted in zip(
-            hand.problems, at.blocks, way.pulls, target, strict=True
-        )
-    )
     unit = np.array([hand.energy / hand.length] * 3 + [hand.energy] * 3)
     net = -at.unbalanced * unit
     return GraspSolution(
-        fingers=fingers,
+        hand=hand,
+        way=way,
+        target=target,
         body=body,
         supported=supported,
-        contacts=_contacts(hand, body, way),
         net_force=net[:3],
         net_moment=net[3:],
         converged=way.reached is None,
@@ -195,7 +212,7 @@ def _contacts(hand: Hand, body: Body, way: Way) -> tuple[ObjectContact, ...]:
         problem, point, friction = hand.problems[index], part.point, part.friction
         length = problem.finger.length
         unit = problem.finger.bending_stiffness / length**2
-        turn = part.place.rotation
+        turn = part.turn
         rubbing = {int(row): k for k, row in enumerate(friction.index)}
         for row in part.touch[point.multipliers[part.touch] > ACTIVE]:
             where = int(point.pairs[row - len(point.tensions), 1])

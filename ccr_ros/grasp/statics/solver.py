@@ -16,10 +16,11 @@ from ccr_ros.model.rotation import Pose
 from ccr_ros.model.settings import SolverSettings
 from ccr_ros.model.solver import FingerSolver, Standing
 
-from .assembly import GraspPoint, Hand, block, gather
+from .assembly import GraspPoint, Hand, derive, gather
 from .body import GRAVITY, Body
 from .path import Path, Way
 from .result import GraspSolution, make_grasp_solution
+from .stack import Guess
 
 Pulls = Mapping[str, Sequence[float] | np.ndarray]
 
@@ -221,10 +222,6 @@ class GraspSolver:
         self.body, self.supported = standing.body, standing.supported
         self._outer, self._point = standing.outer, standing.point
         self._pulls = list(standing.pulls)
-        # A solver that has met no object yet has none among its problems' obstacles.
-        for index, mounted in enumerate(self.hand.mounted):
-            here = self.body.shape.moved(self.hand.in_base(index, self.body.pose))
-            self.hand.problems[index].obstacles = (*mounted.finger.obstacles, here)
 
     # -- inside ----------------------------------------------------------------------------
 
@@ -277,17 +274,15 @@ class GraspSolver:
         """Solve each finger by itself against the object, which its support holds."""
         if self._point is None:
             self._put()
-        parts, reached, iterations = [], None, 0
+        guesses, reached, iterations = [], None, 0
         for index, solver in enumerate(self._started):
             found = solver.solve(target[index])
             iterations += found.certificate.iterations
             if not found.certificate.converged:
                 reached = 0.0
             point = solver.point
-            parts.append(
-                block(self.hand, index, self.body, self.body.pose, point.at.y, point.tensions,
-                      point.forces)
-            )  # fmt: skip
+            guesses.append(Guess(point.at.y, point.tensions, point.forces))
+        parts = derive(self.hand, self.body, self.body.pose, guesses)
         start = gather(self.hand, self.body.pose, parts, load, free=False)
         way = Way(self._path().settled(start), target)
         way.reached, way.iterations = reached, iterations

@@ -3,7 +3,7 @@
 
 That the smallest eigenvalue is above a bound is told without it: by Debreu's lemma, H is positive
 definite on the null space of the constraints' gradients A if and only if H + w A'A is for some w,
-which Cholesky's factorisation says, finger by finger (`newton`). The eigenvalue takes longer; where
+which Cholesky's factorisation says, finger by finger. The eigenvalue takes longer; where
 it is positive Lanczos' method finds it with that matrix's inverse.
 """
 
@@ -18,10 +18,12 @@ from ccr_ros.model.result import row_space
 
 from .assembly import FingerBlock, GraspPoint, Hand
 from .body import Body
+from .elimination import padded
 from .lanczos import largest_pair
 
 STABLE = 1e-6  # a grasp with a smaller eigenvalue is at a branch point, or past it
 _AUGMENT = (1e3, 1e5)  # w, in turn, for gradients of unit length
+_VAST = 1e30  # more than what is taken off it, of which nothing is kept
 _AXES = "xyz"
 
 
@@ -87,12 +89,20 @@ class Stability:
 
     def _definite(self, bound: float, augment: float) -> bool:
         """Whether H - bound + augment A'A is positive definite."""
+        stacks, corner = self._augmented(augment, bound)
         try:
-            blocks, corner = self._augmented(augment, bound)
-            for matrix, border in blocks:
-                np.linalg.cholesky(matrix)
-                if not self.supported:
-                    corner = corner - border.T @ np.linalg.solve(matrix, border)
+            for _, matrix, border in stacks:
+                if self.supported:
+                    np.linalg.cholesky(matrix)
+                    continue
+                # The factor of D with its border below: B' D^-1 B is the square of the last rows.
+                size = matrix.shape[1]
+                bordered = np.zeros((len(matrix), size + 6, size + 6))
+                bordered[:, :size, :size] = matrix
+                bordered[:, size:, :size] = border.swapaxes(1, 2)
+                bordered[:, range(size, size + 6), range(size, size + 6)] = _VAST
+                below = np.linalg.cholesky(bordered)[:, size:, :size]
+                corner = corner - (below @ below.swapaxes(1, 2)).sum(axis=0)
             np.linalg.cholesky(corner)
         except np.linalg.LinAlgError:
             return False
@@ -100,20 +110,27 @@ class Stability:
 
     def _augmented(
         self, augment: float, bound: float = 0.0
-    ) -> tuple[list[tuple[np.ndarray, np.ndarray]], np.ndarray]:
-        """H - bound + augment A'A: each finger's block and border, and the object's block."""
+    ) -> tuple[list[tuple[tuple[int, ...], np.ndarray, np.ndarray]], np.ndarray]:
+        """H - bound + augment A'A: like fingers' blocks and borders, and the object's block."""
         held = self._held
         corner = augment * held.T @ held - bound * np.eye(6)
-        blocks = []
-        for weight, part in zip(self.hand.weights, self.at.blocks, strict=True):
-            rows, columns = _constraints(part)
-            size = np.einsum("ij,ij->i", rows, rows) + np.einsum("ij,ij->i", columns, columns)
-            raised = augment / np.maximum(size, 1e-12)
-            matrix = weight * part.point.hessian + (rows.T * raised) @ rows
-            matrix.flat[:: len(matrix) + 1] -= bound
-            blocks.append((matrix, weight * part.border + (rows.T * raised) @ columns))
-            corner = corner + weight * part.corner + (columns.T * raised) @ columns
-        return blocks, corner
+        stacks = []
+        for members in self.hand.alike:
+            parts = [self.at.blocks[i] for i in members]
+            weights = self.hand.weights[list(members)][:, None, None]
+            both = [_constraints(part) for part in parts]
+            rows, columns = padded([r for r, _ in both]), padded([c for _, c in both])
+            size = np.einsum("fri,fri->fr", rows, rows) + np.einsum("fri,fri->fr", columns, columns)
+            raised = (augment / np.maximum(size, 1e-12))[:, :, None]
+            by_row = (rows * raised).swapaxes(1, 2)
+            matrix = weights * np.stack([p.point.hessian for p in parts]) + by_row @ rows
+            matrix.reshape(len(parts), -1)[:, :: matrix.shape[1] + 1] -= bound
+            border = weights * np.stack([p.border for p in parts]) + by_row @ columns
+            stacks.append((members, matrix, border))
+            own = weights * np.stack([p.corner for p in parts])
+            own += (columns * raised).swapaxes(1, 2) @ columns
+            corner = corner + own.sum(axis=0)
+        return stacks, corner
 
     @cached_property
     def _softest(self) -> tuple[float, np.ndarray]:
@@ -146,11 +163,15 @@ class Stability:
 
         With M = H + augment A'A and Q a basis of A' that is M^-1 - M^-1 Q (Q'M^-1 Q)^-1 Q'M^-1.
         """
-        blocks, corner = self._augmented(augment)
-        inverses = [np.linalg.inv(matrix) for matrix, _ in blocks]
-        reaches = [inverse @ border for inverse, (_, border) in zip(inverses, blocks, strict=True)]
-        for reach, (_, border) in zip(reaches, blocks, strict=True):
-            corner = corner - border.T @ reach
+        stacks, corner = self._augmented(augment)
+        none = np.empty(0)
+        inverses, reaches = [none] * len(self.at.blocks), [none] * len(self.at.blocks)
+        for members, matrix, border in stacks:
+            inverse = np.linalg.inv(matrix)
+            reach = inverse @ border
+            corner = corner - (border.swapaxes(1, 2) @ reach).sum(axis=0)
+            for i, one, way in zip(members, inverse, reach, strict=True):
+                inverses[i], reaches[i] = one, way
         ends = np.cumsum([len(inverse) for inverse in inverses])[:-1]
         by_q = np.linalg.inv(corner)
 
