@@ -29,7 +29,8 @@ _SUPPORT = 100.0
 _SINKING = 60  # steps that an object may sink
 _FAR = 0.2  # of the length, that it may
 _LOOSE = 0.1  # stiffness from which on an equilibrium without support is tried
-_PATIENCE = 10  # Newton steps without a smaller error than any before, until that is given up
+_PATIENCE = 5  # Newton steps that do not halve the smallest error, until that is given up
+_WASTE = 25  # Newton steps in attempts that fail, until there is taken to be no equilibrium
 _TORN = 2e-3  # share of a Newton step; one that would go as far twice has nothing to hold on to
 # A step in which the object goes farther than this (of the length; rad), and than this per change
 # of a pull (of L / disk radius), has left the equilibrium that it should follow.
@@ -117,7 +118,9 @@ class Path:
             fine = max(fine, _SMALLEST_STEP)
         done, smallest = 0.0, min(_SMALLEST_STEP, fine / 64 if rough else 1.0)
         self._deadline = time.thread_time() + self.settings.time_limit
+        wasted, asked = 0.0, 1.0
         while done < 1.0:
+            tried = way.iterations
             if rough and self._touches(way.point):
                 size = min(size, fine)
             share = 1.0 if done + size > 1.0 - 1e-9 else done + size
@@ -134,12 +137,18 @@ class Path:
                 found is not None and stood is None and self._leaps(way.point, found, size * change)
             )
             if found is None or skipped or leapt:
+                if not skipped:
+                    asked = share - done if wasted == 0.0 else asked
+                    wasted += way.iterations - tried
                 size = 0.5 * (share - done)
                 way.late = time.thread_time() > self._deadline
-                if size < smallest or way.late:
+                if size < smallest or wasted > _WASTE or way.late:
                     way.reached = done
                     return
                 continue
+            # Forgotten as far as this step comes of what failed first: an equilibrium that ends
+            # is neared by ever smaller ones.
+            wasted *= max(0.0, 1.0 - (share - done) / asked)
             way.point, way.pulls, done = self._settled(way, found), pulls, share
             way.substeps += 1
             size *= 2.0
@@ -237,7 +246,7 @@ class Path:
                 pairs = zip(hand.problems, at.blocks, strict=True)
                 return None if any(meeting_disks(p, part.point) for p, part in pairs) else at
             error = max(at.residual, over)
-            idle = 0 if error < best else idle + 1
+            idle = 0 if error < 0.5 * best else idle + 1
             best = min(best, error)
             if idle > _PATIENCE or time.thread_time() > self._deadline:
                 return None
@@ -282,7 +291,8 @@ class Path:
             if len(point.pairs):
                 forces[point.pairs[:, 0], point.pairs[:, 1]] = multipliers[count:]
             if self.body.friction > 0:
-                pushes = np.zeros_like(hold.pushes)
+                # One that lets go keeps its force: if it comes back at once, it slips that way.
+                pushes = hold.pushes.copy()
                 along = np.einsum("gi,gij->gj", step.friction[index], friction.tangents)
                 pushes[friction.where] = along @ part.turn
                 hold = replace(hold, pushes=pushes)

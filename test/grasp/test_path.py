@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Walking to other pulls and loads: what ends a walk, and how soon."""
+
+import numpy as np
+import pytest
+from friction_cases import LONG, around, cube, pinch, three_on_a_ball
+
+from ccr_ros.grasp.statics import GraspSolver, sphere_body
+from ccr_ros.model import Pose, load_gripper
+from ccr_ros.resources import find_config
+
+# Newton steps; of 5 ms each. Half of them get to where there is no equilibrium any more.
+FEW = 70
+
+
+def hanging():
+    """The paper's gripper upside down with a ball, without friction."""
+    fingers = load_gripper(find_config("gripper_sphere")).fingers
+    ball = sphere_body(0.112, 0.02, Pose(np.array([0.0, 0.0, 0.110])))
+    solver = GraspSolver(fingers, ball, LONG, gravity=np.array([0.0, 0.0, 9.80665]))
+    solver.solve({name: [0.0059] for name in solver.names}).require_converged()
+    return solver
+
+
+LOST = {
+    "a pinch that is too heavy": (lambda: pinch(0.5), {"mass": 0.02}),
+    "a ball pulled out": (lambda: three_on_a_ball(0.2), {"force": [0.06, 0.02, -0.04]}),
+    "a ball that hangs, too heavy": (hanging, {"mass": 0.2}),
+    "a gripper that hangs and opens": (hanging, {"pulls": 0.0}),
+}
+
+
+@pytest.mark.parametrize("case", sorted(LOST))
+def test_that_there_is_no_equilibrium_is_found_in_few_steps(case):
+    make, wanted = LOST[case]
+    solver = make()
+    solver.let_go().require_converged()
+    wanted, pulls = dict(wanted), {}
+    if "pulls" in wanted:
+        pull = wanted.pop("pulls")
+        pulls = {name: [pull] for name in solver.names}
+    lost = solver.solve(pulls, **wanted)
+    assert not lost.converged and "cannot hold" in lost.message
+    assert lost.iterations < FEW
+
+
+def test_a_point_that_has_only_touched_slips_on_at_the_next_pull():
+    """To stick it would have to be pulled on to the surface; it slips, which one step finds."""
+    solver = GraspSolver(around(2, 0.03), cube(0.5, 0.002), LONG)
+    solver.solve({"finger_1": [0.0004], "finger_2": [0.0004]}).require_converged()
+    touching = solver.solve({"finger_1": [0.0002]}).require_converged()
+    assert touching.margin == pytest.approx(1.0)  # no friction yet
+    pressing = solver.solve({"finger_1": [0.0003], "finger_2": [0.00045]}).require_converged()
+    assert pressing.substeps == 1 and pressing.iterations < 9
+    slipped = next(c for c in pressing.contacts if c.finger == "finger_2")
+    assert slipped.status == "slip" and slipped.margin < 1e-6
