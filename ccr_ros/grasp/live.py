@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -13,6 +14,7 @@ from ccr_ros.grasp.statics.solver import Pulls
 from ccr_ros.model.files import MountedFinger
 from ccr_ros.model.rotation import Pose
 from ccr_ros.model.settings import SolverSettings
+from ccr_ros.model.solver import FingerSolver
 
 _SAME = 1e-6  # m; pulls as near as that to some that failed are not tried
 
@@ -22,7 +24,8 @@ class LiveGrasp:
 
     `want` says where the object is, how heavy, and whether the fingers alone carry it; `solve`
     sees to it with the pulls of now. What cannot be is said in `failure` and `refusal`; then
-    `solution` is the last good one.
+    `solution` is the last good one. An object that was dropped, and that fingers would not carry
+    where it was last, is `lost` until `want` says where it stands: nothing is solved with it.
 
     Args:
         fingers: The fingers, with all that is in their way but the object.
@@ -52,6 +55,9 @@ class LiveGrasp:
         self._wanted = False  # whether it shall be held
         self._to_let_go = False
         self._failed: tuple[dict[str, np.ndarray], GraspSolution] | None = None
+        self._alone = [FingerSolver(mounted.finger, settings) for mounted in fingers]
+        self.lost = False
+        """Whether it was dropped and is out of the fingers' reach; they move by themselves."""
         self.solution: GraspSolution | None = None  # the last good one
         self.failure = ""
         """Why the newest wishes or pulls have no solution; a held object is dropped then."""
@@ -102,13 +108,17 @@ class LiveGrasp:
     def want(self, pose: Pose, mass: float, held: bool) -> bool:
         """Say what is wanted; return whether there is something to `solve`.
 
-        Where the object shall be held, and is not, saying so again has it tried again.
+        Where the object shall be held, and is not, saying so again has it tried again; but one that
+        is `lost` has to stand somewhere first.
 
         Args:
             pose: Of the object in the gripper's frame; see `place`.
             mass: [kg].
             held: Whether the fingers alone carry it.
         """
+        if self.lost and held:
+            self._said, self._mass, self._wanted = pose, mass, held
+            return False
         due = mass != self._mass or held != self._wanted or (held and not self.held)
         place = self.place(pose, held)
         stands = self._solver.supported or not held
@@ -122,26 +132,34 @@ class LiveGrasp:
             self.refusal = ""
         if due:
             self._failed = None
+        self.lost = False
         return due
 
     def solve(self, pulls: Pulls) -> GraspSolution:
         """Return the equilibrium for pulls [m] by finger, or how far it came where there is none.
 
         To find that there is none takes long: pulls that failed are not tried again while nothing
-        else is wanted.
+        else is wanted, nor any with an object that is `lost`.
 
         Raises:
             InvalidValue, UnknownName: Bad pulls; nothing has moved.
         """
-        if self._failed is not None and _near(pulls, self._failed[0]):
-            return self._failed[1]
+        if self._failed is not None:
+            before, failed = self._failed
+            if self.lost or _near(pulls, before):
+                return failed
+            if not failed.supported and self._grip(pulls) < self._weight:
+                return self._lose(pulls, failed)
         found = self._solver.solve(pulls, mass=self._mass)
         self.failure, self._failed = "", None
         if not found.converged:
-            reason = found.message if found.supported else f"dropped: {found.message}"
-            return self._fail(reason, pulls, found)
+            if found.supported:
+                return self._fail(found.message, pulls, found)
+            if self._grip(pulls) == 0.0:
+                return self._lose(pulls, found)
+            return self._fail(f"dropped: {found.message}", pulls, found)
         if not found.supported and not found.contacts:
-            return self._fail("dropped: no finger touches it any more", pulls, found)
+            return self._lose(pulls, found)
         if self._to_let_go:
             found = self._let_go(found)
         self.solution = found
@@ -151,6 +169,35 @@ class LiveGrasp:
         self.failure = reason
         self._failed = {name: np.array(pull) for name, pull in pulls.items()}, found
         return found
+
+    def _lose(self, pulls: Pulls, found: GraspSolution) -> GraspSolution:
+        self.lost = True
+        what = "touches" if self._grip(pulls) == 0.0 else "presses enough to carry"
+        return self._fail(f"dropped: no finger {what} it any more", pulls, found)
+
+    @property
+    def _weight(self) -> float:
+        """[N]; just above 0 without one, which no grip at all is less than."""
+        weight = self._mass * float(np.linalg.norm(self._arguments[3]))
+        return max(weight, float(np.finfo(float).tiny))
+
+    def _grip(self, pulls: Pulls) -> float:
+        """The most that fingers could carry [N] of an object that stands where it was last.
+
+        As if all they press and rub with were along its weight; infinite where it is not known.
+        """
+        body, fingers, most = self._solver.body, self._arguments[0], 0.0
+        for mounted, alone in zip(fingers, self._alone, strict=True):
+            here = body.shape.moved(mounted.base.inverse() @ body.pose)
+            alone.obstacles = (*mounted.finger.obstacles, here)
+            name = mounted.finger.name
+            found = alone.solve(pulls.get(name, self._solver.pulls[name]))
+            if not found.certificate.converged:
+                return math.inf
+            most += sum(
+                contact.force for contact in found.contacts if contact.obstacle == here.name
+            )
+        return most * math.hypot(1.0, body.friction)
 
     def _let_go(self, standing: GraspSolution) -> GraspSolution:
         self._to_let_go = False

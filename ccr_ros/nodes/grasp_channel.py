@@ -37,7 +37,8 @@ _PLAN_STEP = 0.3  # s of CPU; so long may live pulls have to wait for a solve of
 class GraspChannel:
     """Solves fingers and object together, when told to, and publishes what becomes of the object.
 
-    While there is no object, there is nothing here to solve: the fingers go on by themselves.
+    While there is no object, or none that they reach any more, there is nothing here to solve: the
+    fingers go on by themselves.
 
     Args:
         node: The node to make the topics on.
@@ -65,6 +66,7 @@ class GraspChannel:
         self._backlog = Backlog()
         self._stamp = node.get_clock().now().to_msg()  # of the last good pose
         self._told: object = None  # what was last told
+        self._outdated = False  # whether there are other things around than the live object knows
         self._stability: tuple[bool, float] | None = None  # of the last pose that was judged
         self.doubt = ""  # why that is not stable
         self.solve_times: deque[float] = deque(maxlen=_TIMES_KEPT)
@@ -78,7 +80,7 @@ class GraspChannel:
     @property
     def active(self) -> bool:
         """Whether there is an object, and all fingers are solved with it."""
-        return self._live is not None
+        return self._live is not None and not self._live.lost
 
     @property
     def live(self) -> LiveGrasp | None:
@@ -101,9 +103,12 @@ class GraspChannel:
     @property
     def contacts(self) -> tuple[ObjectContact, ...]:
         """Where fingers press on the object, in the gripper's frame."""
-        if self._live is None or self._live.solution is None:
-            return ()
-        return self._live.solution.contacts
+        return () if self._shown is None else self._shown.contacts
+
+    @property
+    def _shown(self) -> GraspSolution | None:
+        """The last good pose, as long as it says where the object is."""
+        return self._live.solution if self._live is not None and self.active else None
 
     def seen(self, objects: Sequence[SceneObject]) -> list[SolidObject]:
         """Return what objects look like, the one in hand where it is."""
@@ -152,6 +157,7 @@ class GraspChannel:
         if item is None:
             gone = self._live is not None
             self._live = self._object = None
+            self._outdated = False
             return gone
         before = self._object
         try:
@@ -159,13 +165,18 @@ class GraspChannel:
         except InvalidValue as error:
             raise error.located(f"objects.{item.name}") from None
         live = self._live if before is not None and before.name == item.name else None
+        anew |= self._outdated or before is None or before.form != item.form
+        if live is not None and live.lost and item.held:  # nobody knows where it is
+            live.want(item.pose, item.mass, item.held)
+            self._object, self._outdated = item, anew
+            return False
         place = item.pose if live is None else live.place(item.pose, item.held)
         if live is None or not (live.held and item.held):
             for channel in self._fingers:
                 shape = item.shape.moved(channel.base.inverse() @ place)
                 channel.finger.check_clear_of_base(shape, f"objects.{item.name}")
         due = False
-        if live is None or before is None or anew or before.form != item.form:
+        if live is None or anew:
             fingers = [
                 MountedFinger(replace(c.finger, obstacles=_others(c, item.name)), c.base)
                 for c in self._fingers
@@ -174,7 +185,7 @@ class GraspChannel:
             self._quality.forget()
             self._stability, due = None, True
         due |= live.want(item.pose, item.mass, item.held)
-        self._live, self._object = live, item
+        self._live, self._object, self._outdated = live, item, False
         return due
 
     def prepare(self, channel: FingerChannel) -> None:
@@ -184,7 +195,7 @@ class GraspChannel:
             InvalidValue: The fingers carry the object.
         """
         live = self._live
-        if live is None or channel.solution is None:
+        if live is None or live.lost or channel.solution is None:
             return
         if not live.supported:
             allowed = "asked while no object is held: what one finger does moves object and fingers"
@@ -238,6 +249,12 @@ class GraspChannel:
         failure = self._live.failure
         self.solves += 1
         self.solve_times.append(found.solve_time)
+        if self._live.lost:
+            self._log.warning(f"{failure}; the fingers move by themselves until it stands again")
+            for channel, task in zip(self._fingers, tasks, strict=True):
+                channel.set_obstacles(_others(channel, self._live.body.name))
+                channel.solve_again(task.stamp)
+            return
         if failure:
             self.failures += 1
             self._log.warning(
@@ -273,7 +290,7 @@ class GraspChannel:
         newest = max((channel.accepted for channel in self._fingers), key=_arrival)
         fault, stale = self.fault, self._stale
         name = None if self._object is None else self._object.name
-        told = (newest.arrived, fault, stale, name)
+        told = (newest.arrived if self.active else 0.0, fault, stale, name)
         if told == self._told:
             return
         self._told = told
@@ -301,23 +318,23 @@ class GraspChannel:
         )
 
     def _measure(self) -> None:
-        if self._live is not None and self._live.solution is not None:
-            self._quality.measure(self._live.solution)
+        if self._shown is not None:
+            self._quality.measure(self._shown)
             self._pace.changed()
 
     def _publish_state(self) -> None:
         header = Header(stamp=self._stamp, frame_id=self._fixed.gripper_frame)
-        live = self._live
+        live, shown = self._live, self._shown
         if live is None:
             self._state.publish(no_object(header))
-        elif live.solution is None:
+        elif shown is None:
             self._state.publish(unsolved_object(header, live.body, self.fault))
         else:
-            self._judge(live.solution)
+            self._judge(shown)
             message = self.fault or self.doubt
-            quality = self._quality.message(live.solution)
+            quality = self._quality.message(shown)
             self._state.publish(
-                grasp_message(header, live.solution, quality, live.held, self._stale, message)
+                grasp_message(header, shown, quality, live.held, self._stale, message)
             )
 
     def _frame(self, item: SceneObject) -> str:

@@ -55,7 +55,7 @@ def grasp_message(
 
 
 def unsolved_object(header: Header, body: Body, message: str) -> GraspState:
-    """Return the state of an object for which no pose of the fingers was found yet."""
+    """Return the state of an object of which it is not known how fingers touch it, if they do."""
     return GraspState(
         header=header,
         object=body.name,

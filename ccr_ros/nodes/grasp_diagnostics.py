@@ -15,7 +15,8 @@ def grasp_verdict(channel: GraspChannel) -> tuple[bytes, str]:
     if live is None:
         return DiagnosticStatus.OK, "no object"
     if live.failure:
-        return DiagnosticStatus.ERROR, live.failure
+        # What the fingers have let go of is no fault of theirs.
+        return DiagnosticStatus.WARN if live.lost else DiagnosticStatus.ERROR, live.failure
     doubts = live.refusal or channel.doubt
     if doubts:
         return DiagnosticStatus.WARN, doubts

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from ccr_ros.grasp.live import LiveGrasp
-from ccr_ros.grasp.statics import sphere_body
-from ccr_ros.model import InvalidValue, Pose, SolverSettings, load_gripper
+from ccr_ros.grasp.statics import Body, sphere_body
+from ccr_ros.model import Box, InvalidValue, Pose, SolverSettings, load_gripper
 from ccr_ros.resources import find_config
 
 G = 9.80665
@@ -189,3 +189,57 @@ def test_bad_pulls_are_named_and_change_nothing(live):
     with pytest.raises(InvalidValue, match="nan"):
         live.solve({"finger_1": [float("nan")]})
     assert live.solution is before and not live.failure
+
+
+CUBE_SHUT = {"finger_1": [0.00217] * 2, "finger_2": [0.003524], "finger_3": [0.003524]}
+
+
+def opening(live, by):
+    """Open the cube's gripper by so much [m]."""
+    return live.solve({name: [max(p - by, 0.0) for p in ps] for name, ps in CUBE_SHUT.items()})
+
+
+@pytest.fixture
+def carried():
+    """The cube, carried by friction."""
+    shape = Box(np.zeros(3), np.full(3, 0.04), edge_radius=0.001, name="cube")
+    body = Body(shape, 0.01, Pose(np.array([0.0, 0.0, 0.170])), 0.8)
+    cube_fingers = load_gripper(find_config("gripper_cube")).fingers
+    live = LiveGrasp(cube_fingers, body, SolverSettings(time_limit=20.0), UPWARDS)
+    live.want(body.pose, body.mass, True)
+    opening(live, 0.0)
+    assert live.held and not live.lost
+    return live
+
+
+def test_what_opening_fingers_let_fall_is_lost_and_nothing_is_solved_with_it(carried):
+    place, tries = carried.body.pose, 0
+    for step in range(1, 40):
+        found = opening(carried, 8e-5 * step)
+        tries += bool(carried.failure)
+        if carried.lost:
+            break
+    assert carried.lost and not carried.held and carried.failure.startswith("dropped: no finger")
+    assert tries <= 2  # one that was walked, and one that need not be
+    assert opening(carried, 0.003) is found and opening(carried, 0.0) is found
+    # It has to stand somewhere before it can be held again.
+    assert not carried.want(place, 0.01, True) and not carried.want(place, 0.02, True)
+    assert opening(carried, 0.0) is found
+    assert carried.want(PLACE, 0.01, False) and not carried.lost
+    opening(carried, 0.003)
+    assert carried.supported and not carried.failure and carried.body.pose is PLACE
+
+
+def test_out_of_reach_at_once_it_is_lost_without_another_try(carried):
+    found = opening(carried, 1.0)  # wide open in one message
+    assert carried.lost and "no finger touches it" in carried.failure
+    assert opening(carried, 0.0) is found
+
+
+def test_what_fails_while_fingers_press_is_tried_again(carried):
+    before = carried.solution
+    carried.want(carried.body.pose, 0.1, True)  # more than friction carries
+    assert not opening(carried, 0.0).converged
+    assert carried.failure and not carried.lost and carried.solution is before
+    assert carried.want(carried.body.pose, 0.01, True)
+    assert opening(carried, 0.0).converged and carried.held
