@@ -226,7 +226,7 @@ def record_turn(result: TurnResult) -> TurnRecord:
 def _row(
     solver: GraspSolver, waypoint: Waypoint
 ) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
-    solution = solver.solve(waypoint.pulls).require_converged()
+    solution = solver.solve(waypoint.pulls, snap=False).require_converged()
     forces = np.zeros(len(solver.names))
     margins = np.full(len(solver.names), np.nan)
     for contact in solution.contacts:

@@ -150,7 +150,7 @@ class LiveGrasp:
                 return failed
             if not failed.supported and self._grip(pulls) < self._weight:
                 return self._lose(pulls, failed)
-        found = self._solver.solve(pulls, mass=self._mass)
+        found = self._solver.solve(pulls, mass=self._mass, snap=False)
         self.failure, self._failed = "", None
         if not found.converged:
             if found.supported:

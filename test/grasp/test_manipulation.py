@@ -196,3 +196,15 @@ def test_bad_values_are_named(solver):
     fresh = GraspSolver([m for m in solver.hand.mounted], replace(solver.body), LONG)
     with pytest.raises(InvalidValue, match="sensitivity"):
         grasp_sensitivity(fresh)
+
+
+def test_no_plan_counts_on_an_object_that_snaps(solver, monkeypatch):
+    allowed, solve = [], solver.solve
+
+    def spy(pulls, **values):
+        allowed.append(bool(pulls) and values.get("snap", True))
+        return solve(pulls, **values)
+
+    monkeypatch.setattr(solver, "solve", spy)
+    plan_move(solver, MoveTarget(shift=np.array([0.0, 0.0, 5e-4])), MoveLimits(waypoints=4))
+    assert len(allowed) > 1 and not any(allowed)

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from friction_cases import LONG, around, cube, pinch, three_on_a_ball
 
+from ccr_ros.grasp.live import LiveGrasp
 from ccr_ros.grasp.statics import GraspSolver, sphere_body
 from ccr_ros.model import Pose, load_gripper
 from ccr_ros.resources import find_config
@@ -39,7 +40,7 @@ def test_that_there_is_no_equilibrium_is_found_in_few_steps(case):
     if "pulls" in wanted:
         pull = wanted.pop("pulls")
         pulls = {name: [pull] for name in solver.names}
-    lost = solver.solve(pulls, **wanted)
+    lost = solver.solve(pulls, **wanted, snap=False)
     assert not lost.converged and "cannot hold" in lost.message
     assert lost.iterations < FEW
 
@@ -54,3 +55,47 @@ def test_a_point_that_has_only_touched_slips_on_at_the_next_pull():
     assert pressing.substeps == 1 and pressing.iterations < 9
     slipped = next(c for c in pressing.contacts if c.finger == "finger_2")
     assert slipped.status == "slip" and slipped.margin < 1e-6
+
+
+PUSH = [0.06, 0.02, -0.04]  # N; beyond the ball's cones
+
+
+def test_a_ball_that_falls_is_caught_lower_down_and_that_is_told():
+    """There is an equilibrium 12 mm lower, which no small step leads to."""
+    solver = three_on_a_ball(0.2)
+    held = solver.let_go().require_converged()
+    caught = solver.solve({}, force=PUSH).require_converged()
+    way = caught.body.pose.position - held.body.pose.position
+    assert way[2] < -0.012 and np.allclose(caught.snapped, way, atol=1e-3)
+    assert caught.stable and caught.message.startswith("the object snapped 12.5 mm")
+    assert np.abs(caught.net_force).max() < 1e-7 and np.abs(caught.net_moment).max() < 1e-8
+    # It goes on from there, with friction again.
+    on = solver.solve({}, force=[0.061, 0.02, -0.04]).require_converged()
+    assert not on.snapped.any() and not on.message
+    assert all(c.friction_force.any() and c.margin < 1.0 for c in on.contacts)
+    back = solver.solve({}, force=[0.0, 0.0, 0.0]).require_converged()  # it does not go up again
+    assert back.body.pose.position[2] < held.body.pose.position[2] - 0.01
+
+
+def test_where_it_may_not_snap_it_is_lost():
+    solver = three_on_a_ball(0.2)
+    held = solver.let_go().require_converged()
+    lost = solver.solve({}, force=PUSH, snap=False)
+    assert not lost.converged and "cannot hold" in lost.message and not lost.snapped.any()
+    again = solver.solve({}).require_converged()  # where it was, under the load before
+    assert np.allclose(again.body.pose.position, held.body.pose.position, atol=1e-9)
+
+
+def test_a_running_gripper_drops_what_would_snap():
+    aslant = np.array([30.0, 10.0, -30.0])  # m/s^2
+    ball = sphere_body(0.04, 0.0005, Pose(np.array([0.0, 0.0, 0.118])), 0.2)
+    live = LiveGrasp(around(3, 0.03), ball, LONG, aslant)
+    pulls = {f"finger_{k}": [0.0008] for k in (1, 2, 3)}
+    live.want(ball.pose, ball.mass, True)
+    live.solve(pulls)
+    assert live.held
+    other = live.copy(60.0)
+    live.want(ball.pose, 0.002, True)
+    assert not live.solve(pulls).converged
+    assert not live.held and live.failure.startswith("dropped: ")
+    assert other.solve({}, mass=0.002).require_converged().snapped[2] < -0.01

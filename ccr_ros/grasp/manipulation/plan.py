@@ -234,7 +234,7 @@ class _Planner:
             for name, cables in names.items():
                 target[name] = (pulls + step.change)[first : first + len(cables)]
                 first += len(cables)
-            found = self.solver.solve(target)
+            found = self.solver.solve(target, snap=False)
             why = self._refusal(found)
             if not why:
                 return found, size

@@ -74,7 +74,7 @@ def compliance_of(solver: GraspSolver, length: float | None = None) -> Complianc
                 solver.resume(begin)
                 wrench = begin.outer.copy()
                 wrench[axis] += sign * size * (1.0 if axis < 3 else length)
-                moved = solver.solve({}, force=wrench[:3], moment=wrench[3:])
+                moved = solver.solve({}, force=wrench[:3], moment=wrench[3:], snap=False)
                 if not moved.converged:  # nothing resists it
                     softest = sign * np.eye(6)[axis]
                     matrix[:] = np.nan

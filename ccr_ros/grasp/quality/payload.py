@@ -147,7 +147,8 @@ class _Walk:
         return 0.5 * self._tolerance * max(abs(self.held), self.grip)
 
     def _at(self, load: float) -> GraspSolution:
-        return self._solver.solve({}, force=self._outer + (load - self.present) * self._along)
+        force = self._outer + (load - self.present) * self._along
+        return self._solver.solve({}, force=force, snap=False)
 
     def _carried(self, solution: GraspSolution) -> float:
         """Load along the direction that contacts balance: what they do to the fingers."""

@@ -49,6 +49,7 @@ class Way:
         slid: Per finger (P, 3), way of its points on the object, in the object's frame [m].
         heat: Energy that friction has given off [J].
         late: The time limit ended it.
+        snapped: (3,) ways that the object went by itself, where its equilibrium ended [m].
     """
 
     point: GraspPoint
@@ -59,6 +60,7 @@ class Way:
     slid: list[np.ndarray] = field(default_factory=list)
     heat: float = 0.0
     late: bool = False
+    snapped: np.ndarray = field(default_factory=lambda: np.zeros(3))
 
 
 class Path:
@@ -96,10 +98,12 @@ class Path:
         target: list[np.ndarray],
         load: np.ndarray,
         stood: Pose | None = None,
+        snaps: int = 0,
     ) -> None:
         """Walk from where ``way`` stands to other pulls [m] and another load (6,), in units.
 
         ``stood``: the pose of a support that goes soft on the way, and is gone at its end.
+        ``snaps``: how many times an equilibrium may end on the way and the object go to the next.
         """
         self._stood = stood
         rough = self.body.friction > 0
@@ -142,9 +146,13 @@ class Path:
                     wasted += way.iterations - tried
                 size = 0.5 * (share - done)
                 way.late = time.thread_time() > self._deadline
-                if size < smallest or wasted > _WASTE or way.late:
+                if size >= smallest and wasted <= _WASTE and not way.late:
+                    continue
+                if way.late or snaps == 0 or not self._snap(way, pulls, next_load):
                     way.reached = done
                     return
+                snaps -= 1
+                done, size, wasted = share, fine, 0.0
                 continue
             # Forgotten as far as this step comes of what failed first: an equilibrium that ends
             # is neared by ever smaller ones.
@@ -159,18 +167,41 @@ class Path:
         Each step is one of implicit Euler on overdamped motion, a spring to where the object is:
         it leaves an equilibrium that has ended for the next one downhill, if there is one near.
         """
+        if self._sinks(way, target, load):
+            way.reached = None
+
+    def _snap(self, way: Way, pulls: list[np.ndarray], load: np.ndarray) -> bool:
+        """Let a free object sink from an equilibrium that has ended to the next; whether it can.
+
+        It slides as if without friction; where it rests friction holds it again, from nothing.
+        """
+        slick = Path(self.hand, replace(self.body, friction=0.0), self.settings, 1.0, True)
+        slick._deadline = self._deadline
+        points = [part.point for part in way.point.blocks]
+        guesses = [Guess(p.at.y, p.tensions, p.forces) for p in points]
+        parts = derive(self.hand, slick.body, way.point.pose, guesses)
+        falling = Way(gather(self.hand, way.point.pose, parts, load), pulls)
+        found = slick._sinks(falling, pulls, load)
+        way.iterations += falling.iterations
+        way.substeps += falling.substeps
+        if found:
+            way.snapped = way.snapped + falling.point.pose.position - way.point.pose.position
+            way.point, way.pulls = self.settled(falling.point), pulls
+        return found
+
+    def _sinks(self, way: Way, target: list[np.ndarray], load: np.ndarray) -> bool:
         stiffness, first = 0.1 * _SUPPORT, way.point.pose
         for _ in range(_SINKING):
             far = float(np.linalg.norm(way.point.pose.position - first.position))
             way.late = time.thread_time() > self._deadline
             if way.late or far > _FAR * self.hand.length:
-                return
+                return False
             self._stood, self._stiffness = way.point.pose, stiffness
             found = self._newton(way, self._sticking(way.point), target, load)
             if found is None:
                 stiffness *= 4.0
                 if stiffness > _SUPPORT:
-                    return
+                    return False
                 continue
             way.point, way.pulls = self._settled(way, found), target
             way.substeps += 1
@@ -179,9 +210,10 @@ class Path:
                 self._stood, self._stiffness = None, 0.0
                 found = self._newton(way, way.point, target, load)
                 if found is not None:
-                    way.point, way.reached = self._settled(way, found), None
-                    return
+                    way.point = self._settled(way, found)
+                    return True
                 stiffness *= 8.0
+        return False
 
     def settled(self, point: GraspPoint) -> GraspPoint:
         """Return a point whose contacts are anchored where they are, without friction yet."""

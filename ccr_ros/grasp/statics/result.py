@@ -83,7 +83,9 @@ class GraspSolution:
         residual: Largest unbalanced generalised force, relative to the largest elastic one.
         iterations, substeps: Newton and continuation steps.
         solve_time: Wall-clock [s].
-        dissipated: Energy that friction gave off in this solve [J].
+        dissipated: Energy that friction gave off in this solve [J]; without what a snap gives off.
+        snapped: (3,) [m] ways that the object went by itself in this solve, to another equilibrium
+            where its own had ended; zero: it followed pulls and loads.
         message: What is wrong, and what to do; empty if nothing is.
     """
 
@@ -102,6 +104,7 @@ class GraspSolution:
     substeps: int
     solve_time: float
     dissipated: float = 0.0
+    snapped: np.ndarray = field(default_factory=lambda: np.zeros(3))
     message: str = field(default="")
 
     @cached_property
@@ -196,6 +199,7 @@ def make_grasp_solution(
         substeps=way.substeps,
         solve_time=elapsed,
         dissipated=way.heat,
+        snapped=way.snapped,
         message=_message(way, "" if stable else stability.softest),
     )
 
@@ -251,6 +255,10 @@ def _message(way: Way, falls: str) -> str:
             f"no equilibrium of fingers and object was found beyond {way.reached:.1%} of the way"
             " to the wanted pulls and loads: the fingers cannot hold the object there"
         )
+    said = []
+    if way.snapped.any():
+        far = float(np.linalg.norm(way.snapped)) * 1e3
+        said.append(f"the object snapped {far:.3g} mm to another equilibrium, as its own had ended")
     if falls:
-        return f"the grasp is not stable: {falls} at the slightest disturbance"
-    return ""
+        said.append(f"the grasp is not stable: {falls} at the slightest disturbance")
+    return "; ".join(said)

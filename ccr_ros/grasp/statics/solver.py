@@ -22,6 +22,8 @@ from .path import Path, Way
 from .result import GraspSolution, make_grasp_solution
 from .stack import Guess
 
+_SNAPS = 4  # in one solve
+
 Pulls = Mapping[str, Sequence[float] | np.ndarray]
 
 
@@ -103,17 +105,20 @@ class GraspSolver:
         mass: float | None = None,
         force: np.ndarray | None = None,
         moment: np.ndarray | None = None,
+        snap: bool = True,
     ) -> GraspSolution:
         """Return the pose for pulls [m] of each finger's cables, and loads on the object.
 
         A solve that does not converge says so, shows the last pose on the way that did, and
-        leaves the solver where it was.
+        leaves the solver where it was. Where the equilibrium of a free object ends on the way, the
+        object may snap to another one; the solution says so.
 
         Args:
             pulls: By finger, one per cable in its order; a finger that is absent keeps its pulls.
             mass: New mass of the object [kg]; None: as it was.
             force: (3,) further force on the object [N], in the gripper's frame; None: as it was.
             moment: (3,) further moment about its centre [N m]; None: as it was.
+            snap: Whether the object may snap; else it is lost where its equilibrium ends.
 
         Raises:
             InvalidValue, UnknownName: Bad values; nothing has moved.
@@ -134,7 +139,8 @@ class GraspSolver:
         else:
             way = self._press(self._pulls, load) if self._point is None else self._way()
             if way.reached is None:
-                self._path().walk(way, target, load)
+                snaps = _SNAPS if snap and not self.supported else 0
+                self._path().walk(way, target, load, snaps=snaps)
         if way.reached is None:
             self._accept(way.point, target)
             self.body, self._outer = replace(body, pose=way.point.pose), outer
