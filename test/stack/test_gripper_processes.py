@@ -63,12 +63,14 @@ def test_grasp_hold_more_weight(rig):
 def test_coordinator_killed_while_holding(rig):
     held(rig)
     before = rig.measured()
-    rig.gripper = None
     rig.kill("gripper_coordinator_node")
     took = rig.until(lambda: all(j.stale for j in rig.servos.joints), "word of stale commands")
     print(f"told after {took:.2f} s")
     assert rig.servos.state == ServoState.ACTIVE
     assert keeps_its_pulls(rig, 2.0, before)
+    # Until its lease is over it seems to be there: goals would go to it, and be lost.
+    rig.until(lambda: not rig.release_client.server_is_ready(), "word that it has gone")
+    rig.gripper = None  # only now: its last words may have come after its end
     rig.start("gripper_coordinator_node")
     rig.until(
         lambda: rig.gripper is not None and rig.gripper.state == GripperState.HOLDING,
