@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from service_msgs.msg import ServiceEventInfo
 
+from embedded_ros.transport import Sample
+
 from .impl.queued import Work
 from .impl.service_ends import ServiceEnd, rmw_request_id_t, unpack
 from .qos import QoSProfile
@@ -17,6 +19,10 @@ from .task import Future
 
 if TYPE_CHECKING:
     from .node import Node
+
+
+def _requests(count: int) -> str:
+    return "a request" if count == 1 else f"{count} requests"
 
 
 class Client(ServiceEnd):
@@ -34,6 +40,9 @@ class Client(ServiceEnd):
         self.context = node.context
         self.callback_group = callback_group
         self._pending_requests: dict[int, Future] = {}
+        #: the servers that a pending request went to, while one of them is there
+        self._asked: dict[int, frozenset[int]] = {}
+        self._lost: set[int] = set()
         self._numbers = itertools.count(1)
         self._lock = threading.Lock()
 
@@ -69,8 +78,10 @@ class Client(ServiceEnd):
 
     def _send_request(self, request: Any, future: Future) -> Future:
         number = next(self._numbers)
+        asked = frozenset(self.handle._writer.peers())
         with self._lock:
             self._pending_requests[number] = future
+            self._asked[number] = asked
         future.add_done_callback(self.remove_pending_request)
         request_id = rmw_request_id_t(self._writer.handle, number)
         try:
@@ -108,7 +119,28 @@ class Client(ServiceEnd):
             for number, known in self._pending_requests.items():
                 if known is future:
                     del self._pending_requests[number]
+                    self._asked.pop(number, None)
                     break
+
+    def look_after(self) -> None:
+        """Tell of requests that nobody is left to answer.
+
+        A server that was killed seems to be there until its lease is over; whatever it is sent is
+        lost, and no server that comes later will ever see it.
+        """
+        if not self._asked or self._ros_destroyed:
+            return
+        present = self._writer.peers().keys()
+        with self._lock:
+            lost = {number for number, asked in self._asked.items() if not asked & present}
+            # One turn later, as an answer may be on its way still.
+            told = lost & self._lost
+            unheard = sum(not self._asked.pop(number) for number in told)
+            self._lost = lost - told
+        if unheard:
+            self._warn(f"nobody served '{{}}' when it was called: {_requests(unheard)} lost")
+        if gone := len(told) - unheard:
+            self._warn(f"the server of '{{}}' went away with {_requests(gone)} unanswered")
 
     def service_is_ready(self) -> bool:
         """Whether a server listens to this client, and this client to it."""
@@ -131,15 +163,11 @@ class Client(ServiceEnd):
             time.sleep(left)
         return ready
 
-    def drain(self) -> None:
-        """Fetch what has arrived, without the responses to other clients."""
-        for sample in self._endpoint.take(256):
-            try:
-                guid = unpack(sample.payload)[0].writer_guid
-            except ValueError:
-                continue
-            if guid == self._writer.handle:
-                self._queue.append(sample)
+    def _is_mine(self, sample: Sample) -> bool:
+        try:  # the responses to other clients come too
+            return unpack(sample.payload)[0].writer_guid == self._writer.handle
+        except ValueError:
+            return True  # whose it is cannot be told: reading it will say what is wrong
 
     def take_work(self) -> Work | None:
         taken = self._read(self._queue.popleft()) if self._queue else None
@@ -147,8 +175,11 @@ class Client(ServiceEnd):
             return None
         header, response = taken
         self._tell(ServiceEventInfo.RESPONSE_RECEIVED, header.request_id, response)
+        number = header.request_id.sequence_number
+        with self._lock:
+            self._asked.pop(number, None)
         try:
-            future = self.get_pending_request(header.request_id.sequence_number)
+            future = self.get_pending_request(number)
         except KeyError:
             return None
 

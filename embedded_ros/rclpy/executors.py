@@ -220,6 +220,7 @@ class Executor:
         if (now := time.monotonic()) >= self._next_poll:
             self._next_poll = now + POLL_PERIOD
             waitables = entities.events + waitables
+            entities.look_after()
         for waitable, node in waitables:
             if self.can_execute(waitable) and waitable.is_ready(entities.wait_set):
                 yield self._claim(waitable, node)

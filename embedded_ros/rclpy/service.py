@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -18,8 +19,10 @@ from .qos import QoSProfile
 if TYPE_CHECKING:
     from .node import Node
 
-#: how long a reply waits for the client to listen, s; as rmw_cyclonedds_cpp does
+#: how long a caller waits for the client to listen, s; as rmw_cyclonedds_cpp does
 _CLIENT_LIMIT = 0.1
+#: how long the response is kept for it after that, s: on a busy machine discovery takes its time
+_LATE_LIMIT = 10.0
 
 
 class Service(ServiceEnd):
@@ -37,6 +40,8 @@ class Service(ServiceEnd):
         super().__init__(node, srv_type, srv_name, qos_profile, "service")
         self.callback = callback
         self.callback_group = callback_group
+        #: responses to clients that do not listen yet, and until when that is borne
+        self._late: deque[tuple[float, rmw_service_info_t, Any]] = deque()
 
     @property
     def name(self) -> str:
@@ -50,10 +55,11 @@ class Service(ServiceEnd):
             sample = self._queue.popleft()
         except IndexError:
             return None, None
-        peers = self.handle._endpoint.peers()
-        if not user_data_value(peers.get(sample.writer, b""), "clientid"):
-            # A client of another middleware puts its identity where it cannot be read from here,
-            # or the client has gone: there is nobody to answer.
+        client = self.handle._endpoint.peers().get(sample.writer)
+        # One that has gone, and is no peer any more, wanted something all the same.
+        if client is not None and not user_data_value(client, "clientid"):
+            # It puts its identity where it cannot be read from here.
+            self._warn("a client of another middleware called '{}': that cannot be answered")
             return None, None
         taken = self._read(sample)
         if taken is None:
@@ -82,32 +88,54 @@ class Service(ServiceEnd):
             raise TypeError(f"Expected {self.srv_type.Response}, got {type(response)}")
         if isinstance(header, rmw_service_info_t):
             request_id = header.request_id
-            if not self._client_listens(header.writer):
+            if not self._client_listens(header.writer, _CLIENT_LIMIT):
+                self._late.append((time.monotonic() + _LATE_LIMIT, header, response))
                 return
         elif isinstance(header, rmw_request_id_t):
             request_id = header
         else:
             raise TypeError(f"Expected the header of a request, got {type(header)}")
-        self.handle._send(request_id, response)
-        self._tell(ServiceEventInfo.RESPONSE_SENT, request_id, response)
+        self._answer(request_id, response)
 
     service_send_response = send_response
 
-    def _client_listens(self, writer: int) -> bool:
-        """Wait a little for the client's reader: it may be found after its writer."""
-        end = time.monotonic() + _CLIENT_LIMIT
-        while True:
-            client = self.handle._endpoint.peers().get(writer)
-            if client is None:
-                return False
+    def _answer(self, request_id: rmw_request_id_t, response: Any) -> None:
+        self.handle._send(request_id, response)
+        self._tell(ServiceEventInfo.RESPONSE_SENT, request_id, response)
+
+    def look_after(self) -> None:
+        """Answer the clients that listen by now."""
+        for _ in range(len(self._late)):
+            try:
+                end, header, response = self._late.popleft()
+            except IndexError:  # the service was destroyed
+                return
+            client = self._endpoint.peers().get(header.writer)
+            if self._client_listens(header.writer):
+                self._answer(header.request_id, response)
+            elif client is None:
+                self._warn("a client of '{}' went away before it was answered")
+            elif time.monotonic() > end:
+                self._warn("a client called '{}' but does not listen; its response is dropped")
+            else:
+                self._late.append((end, header, response))
+
+    def _client_listens(self, writer: int, limit: float = 0.0) -> bool:
+        """Whether the client's reader is there, which may be found after its writer; wait a little
+        for it.
+        """
+        end = time.monotonic() + limit
+        while (client := self._endpoint.peers().get(writer)) is not None:
             if user_data_value(client, "clientid") in self._peer_ids(
                 self._writer.peers(), "clientid"
             ):
                 return True
             if time.monotonic() >= end:
-                self._node.get_logger().warning(
-                    f"a client of service '{self._full_name}' asked but does not listen; "
-                    "its response is dropped"
-                )
-                return False
+                break
             time.sleep(0.002)
+        return False
+
+    def destroy(self) -> None:
+        """Leave the service; use the node's method for it."""
+        super().destroy()
+        self._late.clear()

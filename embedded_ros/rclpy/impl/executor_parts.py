@@ -5,12 +5,16 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from embedded_ros.transport import Reader, Waiter
 
+from .._rclpy_pybind11 import RCLError
 from ..event_handler import EventHandler
+from ..exceptions import InvalidHandle
 from ..timer import Timer
+from .service_ends import ServiceEnd
 from .wait_set import WaitSet
 
 if TYPE_CHECKING:
@@ -103,6 +107,7 @@ class Entities:
                     self.readers[reader] = place
                     self.queued.add(place)
         self.timers = [entity for entity, _ in self.others if isinstance(entity, Timer)]
+        self._service_ends = [end for end, _ in self.others if isinstance(end, ServiceEnd)]
 
     def fill_wait_set(self, can_execute: Callable[[Any], bool], wake: Callable[[], None]) -> None:
         """Ask the waitables that may run what to wait for."""
@@ -124,6 +129,12 @@ class Entities:
         if self.waiter is not waiter or self.foreign_readers != foreign:
             self.waiter, self.foreign_readers = waiter, foreign
             waiter.set_readers(foreign.union(self.readers))
+
+    def look_after(self) -> None:
+        """Have services and clients see to what waits for others."""
+        for end in self._service_ends:
+            with suppress(InvalidHandle, RCLError):  # another thread has just destroyed it
+                end.look_after()
 
     def candidates(self) -> list[int]:
         """The places of what may be ready."""

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import secrets
 import struct
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from embedded_ros.interfaces.registry import registry
@@ -24,6 +25,11 @@ from .queued import QueuedEntity
 if TYPE_CHECKING:
     from ..clock import Clock
     from ..node import Node
+
+
+#: how many messages the middleware keeps for an end that does not fetch them: those to other
+#: clients come here too, and must not push out what is for this one
+_READER_DEPTH = 1000
 
 
 class rmw_request_id_t(NamedTuple):
@@ -81,7 +87,9 @@ class ServiceEnd(QueuedEntity):
         self._id = f"{role}id=" + ".".join(f"{byte:x}" for byte in secrets.token_bytes(16)) + ";"
         participant = node.context.participant
         self._writer = participant.create_writer(*self._arguments(out_topic, out_type))
-        reader = participant.create_reader(*self._arguments(in_topic, in_type))
+        *arguments, qos, announced = self._arguments(in_topic, in_type)
+        qos = replace(qos, depth=max(qos.depth, _READER_DEPTH))
+        reader = participant.create_reader(*arguments, qos, announced)
         keep_all = qos_profile.history == HistoryPolicy.KEEP_ALL
         super().__init__(reader, None if keep_all else max(qos_profile.depth, 1))
         self._introspection: Introspection | None = None
@@ -99,6 +107,25 @@ class ServiceEnd(QueuedEntity):
 
     def _peer_ids(self, peers: dict[int, bytes], key: str) -> set[str]:
         return {value for data in peers.values() if (value := user_data_value(data, key))}
+
+    def look_after(self) -> None:
+        """See to what waits for others; executors call this every now and then."""
+        raise NotImplementedError
+
+    def drain(self) -> None:
+        """Fetch what has arrived."""
+        samples = [sample for sample in self._endpoint.take(256) if self._is_mine(sample)]
+        limit = self._queue.maxlen
+        over = len(self._queue) + len(samples) - limit if limit is not None else 0
+        self._queue.extend(samples)
+        if over > 0:
+            self._warn(f"'{{}}' keeps {limit} messages for a busy node: the oldest {over} are lost")
+
+    def _is_mine(self, sample: Sample) -> bool:
+        return True
+
+    def _warn(self, text: str) -> None:
+        self._node.get_logger().warning(text.format(self._full_name))
 
     def _send(self, request_id: rmw_request_id_t, message: Any) -> None:
         self._writer.write(pack(self._serialize(message), request_id))
