@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Requests and responses that go astray: as few as can be, and none without a word."""
 
+from collections import deque
+
 import pytest
 from rclpy.impl.service_ends import pack, rmw_request_id_t, unpack
-from rclpy.qos import QoSProfile, qos_profile_services_default
+from rclpy.qos import qos_profile_services_default
 from std_srvs.srv import SetBool
 
 from embedded_ros.interfaces.registry import registry
@@ -15,13 +17,11 @@ YES = SetBool.Request(data=True)
 class Flip:
     """A node that serves ``flip`` and keeps what it was asked, and nodes that call it."""
 
-    def __init__(self, make_node, spin, depth=10):
+    def __init__(self, make_node, spin):
         self.make_node, self.spin = make_node, spin
         self.asked = []
         self.server, self.user = make_node("server"), make_node("user")
-        self.service = self.server.create_service(
-            SetBool, "flip", self.flip, qos_profile=QoSProfile(depth=depth)
-        )
+        self.service = self.server.create_service(SetBool, "flip", self.flip)
         self.client = self.connect(self.user)
 
     def flip(self, request, response):
@@ -93,13 +93,19 @@ def test_nothing_is_told_where_nothing_is_lost(flip, told):
     assert "'/flip'" not in log
 
 
-def test_too_many_requests_at_once_are_told_of(make_node, spin, told):
-    flip = Flip(make_node, spin, depth=2)
-    futures = [flip.client.call_async(SetBool.Request(data=n > 2)) for n in range(5)]
+def test_many_may_call_at_once(flip):
+    clients = [flip.connect(flip.user) for _ in range(25)]
+    futures = [client.call_async(YES) for client in clients]  # with a depth of ten
+    assert flip.spin(lambda: all(f.done() for f in futures), flip.server, flip.user)
+
+
+def test_too_many_requests_at_once_are_told_of(flip, told):
+    flip.service._queue = deque(maxlen=2)  # not the thousand that it has room for
+    for n in range(5):
+        flip.client.call_async(SetBool.Request(data=n > 2))
     flip.serve(2)
     assert flip.asked == [True, True]  # the newest
-    told("'/flip' keeps 2 messages for a busy node: the oldest 3 are lost", flip.server)
-    assert flip.spin(lambda: all(f.done() for f in futures[3:]), flip.user)
+    told("'/flip' keeps 2 messages for a busy node: lost the oldest 3", flip.server)
 
 
 def test_responses_to_others_do_not_push_out_ones_own(flip):

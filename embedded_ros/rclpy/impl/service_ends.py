@@ -18,7 +18,7 @@ from embedded_ros.interfaces.registry import registry
 from embedded_ros.transport import Sample
 from embedded_ros.transport.graph import dds_type_name, user_data_value
 
-from ..qos import HistoryPolicy, QoSProfile
+from ..qos import QoSProfile
 from ..service_introspection import Introspection, ServiceIntrospectionState
 from .queued import QueuedEntity
 
@@ -27,9 +27,9 @@ if TYPE_CHECKING:
     from ..node import Node
 
 
-#: how many messages the middleware keeps for an end that does not fetch them: those to other
-#: clients come here too, and must not push out what is for this one
-_READER_DEPTH = 1000
+#: how many messages wait at least, whatever the profile says: who called at the same moment as
+#: others would wait for ever for the answer to a request, or a response, that these pushed out
+LEAST_DEPTH = 1000
 
 
 class rmw_request_id_t(NamedTuple):
@@ -88,10 +88,9 @@ class ServiceEnd(QueuedEntity):
         participant = node.context.participant
         self._writer = participant.create_writer(*self._arguments(out_topic, out_type))
         *arguments, qos, announced = self._arguments(in_topic, in_type)
-        qos = replace(qos, depth=max(qos.depth, _READER_DEPTH))
+        qos = replace(qos, depth=max(qos.depth, LEAST_DEPTH))
         reader = participant.create_reader(*arguments, qos, announced)
-        keep_all = qos_profile.history == HistoryPolicy.KEEP_ALL
-        super().__init__(reader, None if keep_all else max(qos_profile.depth, 1))
+        super().__init__(reader, None if qos.keep_all else qos.depth)
         self._introspection: Introspection | None = None
         node._ros_announce(writer=self._writer, reader=reader)
 
@@ -119,7 +118,7 @@ class ServiceEnd(QueuedEntity):
         over = len(self._queue) + len(samples) - limit if limit is not None else 0
         self._queue.extend(samples)
         if over > 0:
-            self._warn(f"'{{}}' keeps {limit} messages for a busy node: the oldest {over} are lost")
+            self._warn(f"'{{}}' keeps {limit} messages for a busy node: lost the oldest {over}")
 
     def _is_mine(self, sample: Sample) -> bool:
         return True
