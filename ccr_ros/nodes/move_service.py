@@ -16,6 +16,7 @@ from ccr_ros.model import CcrError, InvalidValue
 
 from .grasp_channel import GraspChannel
 from .move_conversions import fill_plan, limits_from_request, target_from_request
+from .turns import take_turn
 
 Steps = Generator[Waypoint | None, str | None, MovePlan]
 
@@ -63,23 +64,16 @@ class MoveService:
         if self._asked is None:
             return
         request, answer = self._asked
-        try:
-            if self._steps is None:
-                self._steps = self._begun(request)
-                next(self._steps)
-            else:
-                late = time.monotonic() > self._ends_at
-                why = f"the time limit of planning: {self._time_limit:g} s" if late else ""
-                self._steps.send(why)
-            return
-        except StopIteration as end:
-            answer.set_result(end.value)
-        except CcrError as error:
-            answer.set_result(error)
-        except Exception as error:  # whatever it is, the node and its fingers must go on
-            self._log.error(f"{type(error).__name__}: {error}")
-            answer.set_result(error)
-        self._asked = self._steps = None
+        if take_turn(lambda: self._turn(request), answer, self._log):
+            self._asked = self._steps = None
+
+    def _turn(self, request: PlanMove.Request) -> None:
+        if self._steps is None:
+            self._steps = self._begun(request)
+            next(self._steps)
+        else:
+            late = time.monotonic() > self._ends_at
+            self._steps.send(f"the time limit of planning: {self._time_limit:g} s" if late else "")
 
     async def _serve(
         self, request: PlanMove.Request, response: PlanMove.Response

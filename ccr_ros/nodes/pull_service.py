@@ -20,6 +20,7 @@ from ccr_ros.model import CcrError, InvalidValue, Pose, UnknownName
 
 from .conversions import certificate_message, contact_message, pose_message
 from .finger_channel import FingerChannel
+from .turns import take_turn
 
 _KINDS = "TIP_POSITION (0), TIP_POSE (1), POINTS (2) or PRESS (3)"
 
@@ -66,20 +67,14 @@ class PullService:
         if not self._waiting:
             return
         request, answer = self._waiting[0]
-        try:
-            if self._steps is None:
-                self._steps = self._begun(request)
-            next(self._steps)
-            return
-        except StopIteration as end:
-            answer.set_result(end.value)
-        except CcrError as error:
-            answer.set_result(error)
-        except Exception as error:  # whatever it is, the node and its fingers must go on
-            self._log.error(f"{type(error).__name__}: {error}")
-            answer.set_result(error)
-        self._waiting.popleft()
-        self._steps = None
+        if take_turn(lambda: self._turn(request), answer, self._log):
+            self._waiting.popleft()
+            self._steps = None
+
+    def _turn(self, request: SolvePulls.Request) -> None:
+        if self._steps is None:
+            self._steps = self._begun(request)
+        next(self._steps)
 
     async def _serve(
         self, request: SolvePulls.Request, response: SolvePulls.Response
