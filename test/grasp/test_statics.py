@@ -8,8 +8,8 @@ import pytest
 
 from ccr_ros.grasp.statics import Body, GraspSolver, sphere_body
 from ccr_ros.grasp.statics.assembly import derive, gather
+from ccr_ros.grasp.statics.meeting import Guess
 from ccr_ros.grasp.statics.path import displaced
-from ccr_ros.grasp.statics.stack import Guess
 from ccr_ros.model import (
     Box,
     InvalidValue,

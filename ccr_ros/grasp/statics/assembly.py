@@ -35,7 +35,8 @@ from ccr_ros.model.sqp import KktPoint
 
 from .body import Body
 from .friction import FrictionRows, Hold, Touching, friction_rows
-from .stack import Derived, Guess, Stack
+from .meeting import Guess
+from .stack import Derived, Stack
 
 
 class Hand:

@@ -17,8 +17,8 @@ from ccr_ros.model.sqp import ACTIVE, Bounds, violation
 from .assembly import FingerBlock, GraspPoint, Hand, derive, gather, held_anew
 from .body import Body
 from .friction import settle
+from .meeting import Guess
 from .newton import Step, newton_step
-from .stack import Guess
 
 _SMALLEST_STEP = 1.0 / 256
 _LARGEST_TURN = 0.5  # rad in one arc, or of the object, in one Newton step

@@ -18,9 +18,9 @@ from ccr_ros.model.solver import FingerSolver, Standing
 
 from .assembly import GraspPoint, Hand, derive, gather
 from .body import GRAVITY, Body
+from .meeting import Guess
 from .path import Path, Way
 from .result import GraspSolution, make_grasp_solution
-from .stack import Guess
 
 _SNAPS = 4  # in one solve
 

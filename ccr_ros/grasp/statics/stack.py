@@ -17,29 +17,13 @@ from ccr_ros.model.files import MountedFinger
 from ccr_ros.model.kinematics import Kinematics, Linearization, Placed
 from ccr_ros.model.rod import RodState
 from ccr_ros.model.rotation import Pose, cross, skew
-from ccr_ros.model.sqp import ACTIVE, BAND, KktPoint
+from ccr_ros.model.sqp import ACTIVE, KktPoint
 
 from .body import Body
 from .friction import Hold, Touching
+from .meeting import Contacts, Guess, Seen, meet
 
 _EYE = np.eye(3)
-
-
-@dataclass(frozen=True, eq=False)
-class Guess:
-    """What is tried for a finger, in its own units.
-
-    Attributes:
-        y: (N,) coordinates.
-        tensions: (C,) multipliers of its cable lengths.
-        forces: (O, P) multipliers of its contacts; the last row is the object's.
-        hold: What friction remembers of it, with its forces; None: nothing.
-    """
-
-    y: np.ndarray
-    tensions: np.ndarray
-    forces: np.ndarray
-    hold: Hold | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,34 +41,6 @@ class Derived:
     columns: np.ndarray
     border: np.ndarray
     corner: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
-class _Contacts:
-    """Points near an obstacle, all fingers' in one list, sorted by finger and obstacle.
-
-    Attributes:
-        finger, obstacle, where: (k,) indices; ``where`` is that of the point.
-        normals: (k, 3) in base frames; bends: (k, 3, 3) Hessians of the distances [1/L].
-        forces: (k,) multipliers.
-        bounds: (F + 1,) where each finger's begin and end.
-    """
-
-    finger: np.ndarray
-    obstacle: np.ndarray
-    where: np.ndarray
-    normals: np.ndarray
-    bends: np.ndarray
-    forces: np.ndarray
-    bounds: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
-class _Seen:
-    """The object as the fingers see it: (F, 3, 3) orientations and (F, 3) centres [L]."""
-
-    turns: np.ndarray
-    centres: np.ndarray
 
 
 class Stack:
@@ -108,7 +64,6 @@ class Stack:
         self._bases = np.stack([m.base.rotation for m in mounted])
         self._origins = np.stack([m.base.position for m in mounted])
         self._frames = np.stack(frames)
-        self._free_points = ~self._kinematics.fixed
 
     def derive(self, body: Body, pose: Pose, guesses: Sequence[Guess]) -> list[Derived]:
         """Return each finger with its derivatives; the body is at ``pose`` in the gripper."""
@@ -116,10 +71,10 @@ class Stack:
         at = kinematics.place(np.stack([g.y for g in guesses]))
         first = kinematics.linearize(at)
         centres = (pose.position - self._origins)[:, None, :] @ self._bases
-        seen = _Seen(
+        seen = Seen(
             self._bases.swapaxes(1, 2) @ pose.rotation, centres[:, 0] / self._lengths[:, None]
         )
-        distances, contacts = self._meet(body, at, seen, guesses)
+        distances, contacts = meet(self._problems, body, at, seen, guesses)
         holds = [g.hold or Hold.none(at.points.shape[1]) for g in guesses]
         rubs = self._rubs(body, seen, holds, guesses)
         pushes = rubs.copy() if rubs is not None else np.zeros_like(at.points)
@@ -140,107 +95,31 @@ class Stack:
         for f, (guess, hold) in enumerate(zip(guesses, holds, strict=True)):
             own = slice(contacts.bounds[f], contacts.bounds[f + 1])
             pushing = contacts.forces[own] > 0
-            jacobian = jacobians[own][pushing]
-            if len(jacobian):
-                less_bent(hessians[f], jacobian, bent[own][pushing])
+            if pushing.any():
+                less_bent(hessians[f], jacobians[own][pushing], bent[own][pushing])
                 balance[f] += contacts.forces[own] @ rows[own]
-            lengths = len(guess.tensions)
-            point = KktPoint(
-                at=_one(at, f, distances[f]),
-                first=_one_linear(first, f),
-                tensions=guess.tensions,
-                forces=guess.forces,
-                pairs=np.stack([contacts.obstacle[own], contacts.where[own]], axis=1),
-                normals=contacts.normals[own],
-                curvatures=contacts.bends[own],
-                rows=np.concatenate([first.lengths[f], rows[own]]),
-                values=np.concatenate(
-                    [at.lengths[f], -distances[f][contacts.obstacle[own], contacts.where[own]]]
-                ),
-                multipliers=np.concatenate([guess.tensions, contacts.forces[own]]),
-                hessian=hessians[f],
-                unbalanced=balance[f],
-                residual=float(np.abs(balance[f]).max() / max(1.0, np.abs(guess.y).max())),
+            point = _point(
+                guess,
+                _one(at, f, distances[f]),
+                _one_linear(first, f),
+                contacts.of(f),
+                rows[own],
+                hessians[f],
+                balance[f],
             )
-            last = len(self._problems[f].finger.obstacles)
+            lengths, last = len(guess.tensions), len(self._problems[f].finger.obstacles)
             touch = lengths + np.flatnonzero(contacts.obstacle[own] == last)
             columns = np.zeros((len(point.rows), 6))
             columns[touch] = outer.columns[own][touch - lengths]
-            found.append(
-                Derived(
-                    Touching(point, touch, hold, seen.centres[f], seen.turns[f], self._frames[f]),
-                    columns,
-                    outer.border(f, first.points[f]),
-                    outer.corners[f],
-                )
-            )
+            near = Touching(point, touch, hold, seen.centres[f], seen.turns[f], self._frames[f])
+            border = outer.border(f, first.points[f])
+            found.append(Derived(near, columns, border, outer.corners[f]))
         return found
 
     # -- inside ----------------------------------------------------------------------------
 
-    def _meet(
-        self, body: Body, at: Placed, seen: _Seen, guesses: Sequence[Guess]
-    ) -> tuple[list[np.ndarray], _Contacts]:
-        """Distances (O, P) of each finger's points, and all that are near something."""
-        count, points = at.points.shape[:2]
-        units = self._lengths[:, None, None]
-        local = (at.points - seen.centres[:, None]) * units @ seen.turns
-        away = body.shape.signed_distance(local.reshape(-1, 3)).reshape(count, points)
-        away /= self._lengths[:, None]
-        forces = np.stack([g.forces[-1] for g in guesses])
-        finger, where = np.nonzero(((away < BAND) | (forces > 0)) & self._free_points)
-        normals, bends = np.empty((0, 3)), np.empty((0, 3, 3))
-        if len(finger):
-            turns = seen.turns[finger]
-            normals, bends = body.shape.derivatives(local[finger, where])
-            normals = (turns @ normals[:, :, None])[:, :, 0]
-            bends = turns @ bends @ turns.swapaxes(1, 2) * units[finger]
-        pressing = forces[finger, where]
-        if not any(p.finger.obstacles for p in self._problems):
-            bounds = np.searchsorted(finger, np.arange(count + 1))
-            contacts = _Contacts(
-                finger, np.zeros_like(finger), where, normals, bends, pressing, bounds
-            )
-            return [row[None] for row in away], contacts
-        distances, parts = [], []
-        for f, problem in enumerate(self._problems):
-            table, pairs, own_normals, own_bends = self._own(f, problem, at.points[f], guesses[f])
-            of = finger == f
-            last = np.full(int(of.sum()), len(table))
-            parts.append(
-                (
-                    np.full(len(pairs) + len(last), f),
-                    np.concatenate([pairs[:, 0], last]),
-                    np.concatenate([pairs[:, 1], where[of]]),
-                    np.concatenate([own_normals, normals[of]]),
-                    np.concatenate([own_bends, bends[of]]),
-                    np.concatenate([guesses[f].forces[pairs[:, 0], pairs[:, 1]], pressing[of]]),
-                )
-            )
-            distances.append(np.concatenate([table, away[f][None]]))
-        joined = [np.concatenate(columns) for columns in zip(*parts, strict=True)]
-        bounds = np.searchsorted(joined[0], np.arange(count + 1))
-        return distances, _Contacts(*joined, bounds)  # type: ignore
-
-    def _own(
-        self, f: int, problem: EquilibriumProblem, points: np.ndarray, guess: Guess
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """A finger and the obstacles that are its own: distances, pairs, normals, Hessians."""
-        obstacles, length = problem.finger.obstacles, self._lengths[f]
-        table = np.empty((len(obstacles), len(points)))
-        for distances, obstacle in zip(table, obstacles, strict=True):
-            distances[:] = obstacle.signed_distance(points * length) / length
-        near = ((table < BAND) | (guess.forces[:-1] > 0)) & self._free_points
-        pairs = np.argwhere(near)
-        normals, bends = np.empty((len(pairs), 3)), np.empty((len(pairs), 3, 3))
-        for i, obstacle in enumerate(obstacles):
-            of = pairs[:, 0] == i
-            if of.any():
-                normals[of], bends[of] = obstacle.derivatives(points[pairs[of, 1]] * length)
-        return table, pairs, normals, bends * length
-
     def _rubs(
-        self, body: Body, seen: _Seen, holds: Sequence[Hold], guesses: Sequence[Guess]
+        self, body: Body, seen: Seen, holds: Sequence[Hold], guesses: Sequence[Guess]
     ) -> np.ndarray | None:
         """Friction forces (F, P, 3) on the fingers in their base frames, of points that press."""
         if body.friction <= 0:
@@ -262,9 +141,9 @@ class _Outer:
 
     def __init__(
         self,
-        contacts: _Contacts,
+        contacts: Contacts,
         at: Placed,
-        seen: _Seen,
+        seen: Seen,
         rubs: np.ndarray | None,
         frames: np.ndarray,
         problems: Sequence[EquilibriumProblem],
@@ -305,6 +184,34 @@ class _Outer:
         own = self._finger == f
         flat = points[self._where[own]].reshape(-1, points.shape[2])
         return -(flat.T @ self._by_point[own].reshape(-1, 6)) @ self._frames[f]
+
+
+def _point(
+    guess: Guess,
+    at: Evaluation,
+    first: Linearization,
+    contacts: Contacts,
+    rows: np.ndarray,
+    hessian: np.ndarray,
+    balance: np.ndarray,
+) -> KktPoint:
+    """One finger, with its contacts and their rows (c, N)."""
+    pairs = contacts.obstacle, contacts.where
+    return KktPoint(
+        at=at,
+        first=first,
+        tensions=guess.tensions,
+        forces=guess.forces,
+        pairs=np.stack(pairs, axis=1),
+        normals=contacts.normals,
+        curvatures=contacts.bends,
+        rows=np.concatenate([first.lengths, rows]),
+        values=np.concatenate([at.lengths, -at.distances[pairs]]),
+        multipliers=np.concatenate([guess.tensions, contacts.forces]),
+        hessian=hessian,
+        unbalanced=balance,
+        residual=float(np.abs(balance).max() / max(1.0, np.abs(guess.y).max())),
+    )
 
 
 def _one(at: Placed, f: int, distances: np.ndarray) -> Evaluation:
