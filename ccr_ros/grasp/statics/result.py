@@ -260,5 +260,7 @@ def _message(way: Way, falls: str) -> str:
         far = float(np.linalg.norm(way.snapped)) * 1e3
         said.append(f"the object snapped {far:.3g} mm to another equilibrium, as its own had ended")
     if falls:
-        said.append(f"the grasp is not stable: {falls} at the slightest disturbance")
+        slips = any(part.hold.slipping.any() for part in way.point.blocks)
+        free = ", what slips taken as free" if slips else ""
+        said.append(f"the grasp is not stable: {falls} at the slightest disturbance{free}")
     return "; ".join(said)
