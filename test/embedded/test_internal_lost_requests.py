@@ -99,6 +99,12 @@ def test_many_may_call_at_once(flip):
     assert flip.spin(lambda: all(f.done() for f in futures), flip.server, flip.user)
 
 
+def test_what_is_sent_at_once_can_all_be_sent_again(flip):
+    # A dozen responses to clients that had only just been found: the first was lost now and then.
+    ends = {e.topic: e for e in flip.user.context.participant.endpoints() if not e.is_reader}
+    assert ends["rq/flipRequest"].qos.depth == ends["rr/flipReply"].qos.depth == 100
+
+
 def test_too_many_requests_at_once_are_told_of(flip, told):
     flip.service._queue = deque(maxlen=2)  # not the thousand that it has room for
     for n in range(5):

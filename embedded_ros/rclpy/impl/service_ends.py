@@ -18,7 +18,7 @@ from embedded_ros.interfaces.registry import registry
 from embedded_ros.transport import Sample
 from embedded_ros.transport.graph import dds_type_name, user_data_value
 
-from ..qos import QoSProfile
+from ..qos import HistoryPolicy, QoSProfile
 from ..service_introspection import Introspection, ServiceIntrospectionState
 from .queued import QueuedEntity
 
@@ -27,9 +27,12 @@ if TYPE_CHECKING:
     from ..node import Node
 
 
-#: how many messages wait at least, whatever the profile says: who called at the same moment as
-#: others would wait for ever for the answer to a request, or a response, that these pushed out
-LEAST_DEPTH = 1000
+#: how many messages a reader and its queue hold at least, whatever the profile says: who called at
+#: the same moment as others would wait for ever for an answer to what these pushed out
+LEAST_QUEUE = 1000
+#: how many a writer holds at least until they are acknowledged. What is written while the two sides
+#: are still finding each other may have to be sent again.
+LEAST_HISTORY = 100
 
 
 class rmw_request_id_t(NamedTuple):
@@ -86,17 +89,19 @@ class ServiceEnd(QueuedEntity):
         self._deserialize = registry.deserializer(in_type)
         self._id = f"{role}id=" + ".".join(f"{byte:x}" for byte in secrets.token_bytes(16)) + ";"
         participant = node.context.participant
-        self._writer = participant.create_writer(*self._arguments(out_topic, out_type))
-        *arguments, qos, announced = self._arguments(in_topic, in_type)
-        qos = replace(qos, depth=max(qos.depth, LEAST_DEPTH))
-        reader = participant.create_reader(*arguments, qos, announced)
-        super().__init__(reader, None if qos.keep_all else qos.depth)
+        arguments = self._arguments(out_topic, out_type, LEAST_HISTORY)
+        self._writer = participant.create_writer(*arguments)
+        arguments = self._arguments(in_topic, in_type, LEAST_QUEUE)
+        reader = participant.create_reader(*arguments)
+        keep_all = qos_profile.history == HistoryPolicy.KEEP_ALL
+        super().__init__(reader, None if keep_all else max(qos_profile.depth, LEAST_QUEUE))
         self._introspection: Introspection | None = None
         node._ros_announce(writer=self._writer, reader=reader)
 
-    def _arguments(self, topic: str, msg_type: Any) -> tuple[Any, ...]:
+    def _arguments(self, topic: str, msg_type: Any, depth: int) -> tuple[Any, ...]:
         name = msg_type._spec_.name
         qos = self.qos_profile.decide()
+        qos = replace(qos, depth=max(qos.depth, depth))
         return topic, dds_type_name(name), registry.type_hash(name), qos, self._id
 
     @property
