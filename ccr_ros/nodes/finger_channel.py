@@ -25,7 +25,7 @@ from .qos import COMMAND_QUEUE, LATCHED
 
 _TIMES_KEPT = 1000  # solve times, for the percentiles
 _WARN_EVERY = 2.0  # s
-_SAME = 1e-7  # m; pulls as near as that to those of the pose have this pose
+_SAME = 1e-7  # m; pulls as near to each other as that have the same pose
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ class FingerChannel:
         """Whether the pose is that of the wanted pulls already, and nothing else is due."""
         if self._anew or self.fault or self.solution is None:
             return False
-        return bool(np.all(np.abs(self._wanted.pulls - self.solution.pulls) <= _SAME))
+        return _same(self._wanted.pulls, self.solution.pulls)
 
     def set_obstacles(self, obstacles: Sequence[Obstacle]) -> None:
         """Replace all obstacles, given in the finger's base frame; nothing is solved yet.
@@ -195,7 +195,7 @@ class FingerChannel:
             return
         stamp = self._stamp(message.header.stamp)
         if self._waiting:
-            self.dropped += 1
+            self.dropped += not _same(pulls, self._wanted.pulls)
         elif not self._backlog.growing:
             self._backlog.mark_seen(self.received)  # a single message: solved at the first look
         self._refusal = ""
@@ -238,3 +238,7 @@ class FingerChannel:
         if self.solution is not None:
             header = Header(stamp=self._pose_stamp, frame_id=self.frames.base)
             self._state.publish(state_message(header, self.solution, self.stale, self.dropped))
+
+
+def _same(one: np.ndarray, other: np.ndarray) -> bool:
+    return bool(np.all(np.abs(one - other) <= _SAME))
