@@ -245,7 +245,8 @@ def settle(
         went = rows.where[rows.slips]
         ways[went] = anchors[went] - hold.anchors[went]
         slipping[went] = True
-        before = np.linalg.norm(hold.pushes[went], axis=1)
-        mean = 0.5 * (before + np.linalg.norm(pushes[went], axis=1))
+        after = np.linalg.norm(pushes[went], axis=1)
+        before = np.where(hold.slipping[went], np.linalg.norm(hold.pushes[went], axis=1), after)
+        mean = 0.5 * (before + after)
         heat = float(mean @ np.linalg.norm(ways[went], axis=1))
     return Hold(anchors, pushes, slipping), Slip(ways, heat)
