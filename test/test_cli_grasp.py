@@ -142,3 +142,34 @@ def test_bad_input_is_one_clear_line(ccr, words, named, capsys):
     code, out, err = ccr(*words)
     assert code == 2 and out == ""
     assert err.startswith("ccr: error: ") and err.count("\n") == 1 and named in err
+
+
+CLOSED = ("gripper_sphere", "--object", "sphere:0.01", "--center-height", "0.5", "--pull", "4.7%")
+
+
+def test_disks_that_press_on_each_other_are_told(ccr):
+    code, out, err = ccr(*CLOSED, "--disks", "0.0015", "--json")
+    assert (code, err) == (1, "")  # nothing is held
+    contacts = strict_json(out)["disk_contacts"]
+    assert [c["disks"] for c in contacts] == [[9, 9]] * 3
+    assert contacts[0]["fingers"] == ["finger_1", "finger_2"] and contacts[0]["force"] > 0.01
+    assert np.linalg.norm(contacts[0]["normal"]) == pytest.approx(1.0)
+    code, out, _ = ccr(*CLOSED, "--disks", "0.0015")
+    assert "  disk 9 of finger_1 and disk 9 of finger_2 press on each other at " in out
+    wider = (*CLOSED, "--pull", "4.3%")
+    assert strict_json(ccr(*wider, "--disks", "--json")[1])["disk_contacts"] == []
+    assert strict_json(ccr(*CLOSED, "--json")[1])["disk_contacts"] == []
+
+
+@pytest.mark.parametrize(
+    ("rim", "words"),
+    [
+        ("wide", "--disks"),
+        ("nan", "--disks"),
+        ("-1", "--disks"),
+        ("0.04", "cut each other at rest"),
+    ],
+)
+def test_rims_that_cannot_be(ccr, rim, words):
+    code, out, err = ccr(*CLOSED, f"--disks={rim}")
+    assert code == 2 and not out and err.startswith("ccr: error: ") and words in err

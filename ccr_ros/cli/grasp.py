@@ -22,9 +22,10 @@ import numpy as np
 
 from ccr_ros.cli.grasp_arguments import add_body_arguments, body_from_args, gravity_from_args
 from ccr_ros.cli.grasp_report import Findings, report, to_dict
+from ccr_ros.cli.options import number
 from ccr_ros.cli.solve import parse_pull
 from ccr_ros.grasp.quality import compliance_of, payload_until_slip, quality_of
-from ccr_ros.grasp.statics import GraspSolver
+from ccr_ros.grasp.statics import DiskShape, GraspSolver
 from ccr_ros.model import InvalidValue, SolverSettings, UnknownName, load_gripper
 from ccr_ros.resources import find_config
 
@@ -47,6 +48,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="also the weight at which contacts slip and at which it is lost (takes longer)",
     )
+    parser.add_argument(
+        "--disks",
+        metavar="RIM",
+        nargs="?",
+        const="0",
+        help="disks of different fingers press on each other instead of going through each other;"
+        " RIM is how far they reach beyond their holes [m] (default 0)",
+    )
     parser.add_argument("--json", action="store_true", help="print one JSON object")
 
 
@@ -55,7 +64,9 @@ def run(args: argparse.Namespace) -> int:
     body = body_from_args(args)
     gripper = load_gripper(find_config(args.gripper))
     gravity = gravity_from_args(args)
-    solver = GraspSolver(gripper.fingers, body, SolverSettings(time_limit=_TIME_LIMIT), gravity)
+    disks = None if args.disks is None else DiskShape(rim=number("--disks", args.disks, 0, 1))
+    settings = SolverSettings(time_limit=_TIME_LIMIT)
+    solver = GraspSolver(gripper.fingers, body, settings, gravity, disks=disks)
     solution = solver.solve(parse_grip(args.pull, solver))
     if solution.converged:
         solution = solver.let_go()

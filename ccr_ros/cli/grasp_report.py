@@ -57,6 +57,9 @@ def report(found: Findings) -> str:
         )
     if not solution.contacts:
         lines.append("  nothing touches the object")
+    for d in solution.disk_contacts:
+        x, y, z = _millimetres(d.position)
+        lines.append(f"  {d.in_words()} at {x:.2f} {y:.2f} {z:.2f} mm with {d.force:.4g} {unit}")
     lines += ["", *_measures(found, unit)]
     state = "held" if found.held else "NOT HELD"
     lines.append(
@@ -137,6 +140,16 @@ def to_dict(found: Findings) -> dict[str, Any]:
                 "margin": _number(c.margin),
             }
             for c in solution.contacts
+        ],
+        "disk_contacts": [
+            {
+                "fingers": list(d.fingers),
+                "disks": list(d.disks),
+                "position": d.position.tolist(),
+                "normal": d.normal.tolist(),
+                "force": d.force,
+            }
+            for d in solution.disk_contacts
         ],
     }
     if found.quality is not None:

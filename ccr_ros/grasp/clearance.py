@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """How near the disks of a gripper's fingers come to each other.
 
-The equilibrium knows contacts with obstacles and with the object, not of finger with finger, nor
-of a finger that is rolled up with itself. This tells afterwards whether there would be any. Disks
-are flat, round and filled, without thickness.
+The equilibrium knows contacts with obstacles and with the object; of finger with finger, and of a
+finger that is rolled up with itself, only where it is told to (`statics.DiskShape`). This tells
+afterwards whether there would be any. Disks are flat, round and filled, without thickness.
 
 The distance of two disks is that of two convex sets A and B: accelerated projections (FISTA) give
 points a and b, and with them an upper bound |a - b|; for any unit vector u,

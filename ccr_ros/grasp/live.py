@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ccr_ros.grasp.statics import Body, GraspSolution, GraspSolver
+from ccr_ros.grasp.statics import Body, DiskShape, GraspSolution, GraspSolver
 from ccr_ros.grasp.statics.solver import Pulls
 from ccr_ros.model.files import MountedFinger
 from ccr_ros.model.rotation import Pose
@@ -33,6 +33,7 @@ class LiveGrasp:
         settings: Of the solver.
         gravity: (3,) [m/s^2] in the gripper's frame.
         at: Where the object is, if not at the pose that is said of it.
+        disks: What of the disks presses on other disks; None: nothing.
 
     Raises:
         InvalidValue: As for `GraspSolver`.
@@ -45,9 +46,10 @@ class LiveGrasp:
         settings: SolverSettings,
         gravity: np.ndarray,
         at: Pose | None = None,
+        disks: DiskShape | None = None,
     ) -> None:
         start = body if at is None else replace(body, pose=at)
-        self._solver = GraspSolver(fingers, start, settings, gravity)
+        self._solver = GraspSolver(fingers, start, settings, gravity, disks=disks)
         self._arguments = fingers, start, settings, gravity
         self._copy: GraspSolver | None = None
         self._said = body.pose
@@ -90,7 +92,7 @@ class LiveGrasp:
         if self._copy is None:
             fingers, body, settings, gravity = self._arguments
             settings = replace(settings, time_limit=min(settings.time_limit, time_limit))
-            self._copy = GraspSolver(fingers, body, settings, gravity)
+            self._copy = GraspSolver(fingers, body, settings, gravity, disks=self._solver.disks)
         self._copy.resume(self._solver.standing)
         return self._copy
 

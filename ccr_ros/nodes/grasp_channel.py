@@ -181,7 +181,8 @@ class GraspChannel:
                 MountedFinger(replace(c.finger, obstacles=_others(c, item.name)), c.base)
                 for c in self._fingers
             ]
-            live = LiveGrasp(fingers, body, self._fixed.settings, self._fixed.gravity, place)
+            fixed = self._fixed
+            live = LiveGrasp(fingers, body, fixed.settings, fixed.gravity, place, fixed.disks)
             self._quality.forget()
             self._stability, due = None, True
         due |= live.want(item.pose, item.mass, item.held)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from rclpy.node import Node
 
+from ccr_ros.grasp.statics import DiskShape
 from ccr_ros.grasp.statics.body import GRAVITY
 from ccr_ros.model import (
     Gripper,
@@ -42,6 +43,7 @@ class SolverParameters:
         gravity: (3,) [m/s^2] in the gripper's frame.
         grasp_state_rate: Most messages per second [Hz].
         quality_rate: Most measurements of the grasp's quality per second [Hz].
+        disks: What of them presses on other fingers' disks in mode gripper; None: nothing.
         move_margin: Least friction margin of a planned motion, if the request says none.
         move_time_limit: Longest that planning a motion may take [s].
     """
@@ -55,6 +57,7 @@ class SolverParameters:
     gravity: np.ndarray
     grasp_state_rate: float
     quality_rate: float
+    disks: DiskShape | None
     move_margin: float
     move_time_limit: float
 
@@ -139,6 +142,18 @@ def declare(node: Node) -> SolverParameters:
         " some 30 ms, and pulls wait meanwhile.",
         (0.05, 100.0),
     )
+    disk_contact = parameters.fixed(
+        "disk_contact",
+        False,
+        "Whether disks of different fingers press on each other, in mode gripper, instead of going"
+        " through each other.",
+    )
+    disk_rim = parameters.fixed(
+        "disk_rim",
+        0.0,
+        "How far disks reach beyond their holes [m], for disk_contact.",
+        (0.0, 1.0),
+    )
     move_margin = parameters.fixed(
         "move_margin",
         0.1,
@@ -173,6 +188,7 @@ def declare(node: Node) -> SolverParameters:
         gravity=checks.vector("gravity", list(gravity), 3, unit="m/s^2", largest=1e3),
         grasp_state_rate=grasp_state_rate,
         quality_rate=quality_rate,
+        disks=DiskShape(rim=disk_rim) if disk_contact else None,
         move_margin=move_margin,
         move_time_limit=move_time_limit,
     )

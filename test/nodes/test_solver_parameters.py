@@ -22,10 +22,12 @@ OWN = (
     "gravity",
     "grasp_state_rate",
     "quality_rate",
+    "disk_contact",
+    "disk_rim",
     "markers",
     "marker_rate",
 )
-FIXED = OWN[:11]
+FIXED = OWN[:13]
 
 
 def test_every_parameter_is_described(start):
@@ -44,6 +46,8 @@ def test_every_parameter_is_described(start):
         ("arcs_per_segment", 65),
         ("arcs_per_segment", "two"),
         ("time_limit", 0.0),
+        ("disk_contact", 1),
+        ("disk_rim", -0.001),
         ("marker_rate", 0.0),
         ("marker_rate", 1000.0),
         ("markers", 1),

@@ -3,11 +3,14 @@
 
 from .body import Body, box_body, capsule_body, cylinder_body, mesh_body, sphere_body
 from .closing import close_with_forces, pressing
-from .result import GraspSolution, ObjectContact
+from .disks import DiskShape
+from .result import DiskContact, GraspSolution, ObjectContact
 from .solver import GraspSolver
 
 __all__ = [
     "Body",
+    "DiskContact",
+    "DiskShape",
     "GraspSolution",
     "GraspSolver",
     "ObjectContact",

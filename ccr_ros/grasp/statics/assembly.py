@@ -24,6 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -37,6 +38,9 @@ from .body import Body
 from .friction import FrictionRows, Hold, Touching, friction_rows
 from .meeting import Guess
 from .stack import Derived, Stack
+
+if TYPE_CHECKING:
+    from .disks import NearDisks
 
 
 class Hand:
@@ -156,6 +160,8 @@ class GraspPoint:
         load: (6,) force and moment on the object about its centre, in units.
         unbalanced: (6,) what load and contacts leave over.
         residual: Largest unbalanced generalised force relative to the largest elastic one or 1.
+        near_disks: Disks near each other; None where they do not count. Their forces are in the
+            blocks.
     """
 
     pose: Pose
@@ -163,6 +169,7 @@ class GraspPoint:
     load: np.ndarray
     unbalanced: np.ndarray
     residual: float
+    near_disks: NearDisks | None = None
 
 
 def derive(hand: Hand, body: Body, pose: Pose, guesses: Sequence[Guess]) -> list[FingerBlock]:
@@ -204,7 +211,12 @@ def _with_friction(
 
 
 def gather(
-    hand: Hand, pose: Pose, blocks: Sequence[FingerBlock], load: np.ndarray, free: bool = True
+    hand: Hand,
+    pose: Pose,
+    blocks: Sequence[FingerBlock],
+    load: np.ndarray,
+    free: bool = True,
+    near_disks: NearDisks | None = None,
 ) -> GraspPoint:
     """Put the blocks together and say how far from equilibrium all is.
 
@@ -214,6 +226,7 @@ def gather(
         blocks: One per finger.
         load: (6,) on the object, in units.
         free: Whether the object is; else its support balances it.
+        near_disks: Disks near each other, whose forces the blocks have (`disks.press`).
     """
     unbalanced = -load
     worst, largest = 0.0, 1.0
@@ -223,4 +236,4 @@ def gather(
         largest = max(largest, float(np.abs(part.point.at.y).max()))
     if free:
         worst = max(worst, float(np.abs(unbalanced).max()))
-    return GraspPoint(pose, tuple(blocks), load, unbalanced, worst / largest)
+    return GraspPoint(pose, tuple(blocks), load, unbalanced, worst / largest, near_disks)

@@ -11,6 +11,7 @@ import numpy as np
 from ccr_ros.model.sqp import definite
 
 from .assembly import FingerBlock, GraspPoint, Hand
+from .shared import Shared
 from .surface import Surface
 
 _PROX = 1e-9  # of the object's own block: a ball may turn freely, and shall not
@@ -28,6 +29,7 @@ class Task:
         support: Stiffness of a support that gives way, in units.
         slacks: Per finger (C + c,) room of its lengths and normals.
         surfaces: Per finger, what friction does.
+        shared: Rows that fingers share, after each finger's own ones.
     """
 
     hand: Hand
@@ -36,6 +38,7 @@ class Task:
     support: float
     slacks: list[np.ndarray]
     surfaces: list[Surface]
+    shared: Shared
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +53,7 @@ class Eliminated:
         by_slope: (F, N); by_q: (F, N, 6); by_force: (F, N, R).
         left: (F, 6, N) E.
         rows: (F, R, N), columns: (F, R, 6): R and C; acting_q: (F, R, 6): G.
-        values: (F, R) room of lengths and normals, or negative ways.
+        values: (F, R) room of lengths and normals, or negative ways; 0 of shared rows.
     """
 
     members: tuple[int, ...]
@@ -206,10 +209,13 @@ def _rows(
     rows, columns, values, fixed = [], [], [], []
     for i in members:
         index, surface, part = chosen[i], task.surfaces[i], task.at.blocks[i]
-        rows.append(np.concatenate([part.point.rows[index], surface.rows]))
-        columns.append(np.concatenate([part.columns[index], surface.columns]))
-        values.append(np.concatenate([task.slacks[i][index], -surface.ways]))
-        fixed.append(np.concatenate([part.point.active[index], surface.sticks]))
+        shared, none = task.shared.rows[i], np.zeros(len(task.shared))
+        rows.append(np.concatenate([part.point.rows[index], surface.rows, shared]))
+        columns.append(
+            np.concatenate([part.columns[index], surface.columns, np.zeros((len(none), 6))])
+        )
+        values.append(np.concatenate([task.slacks[i][index], -surface.ways, none]))
+        fixed.append(np.concatenate([part.point.active[index], surface.sticks, none > 0]))
     counts = np.array([len(v) for v in values])
     real = np.flatnonzero(np.arange(counts.max()) < counts[:, None])
     return padded(rows), padded(columns), padded(values), padded(fixed), real

@@ -14,12 +14,15 @@ maps the constraints' forces to their changes. A point that sticks has two rows 
 the surface, which must vanish. Of one that slips, the normal's force acts along normal + mu times
 the direction of slip; across that direction it has one row more, with a compliance: the way's
 direction turns as the force does (the linearised projection of `friction`).
+
+Rows that fingers share (`shared`) have parts R_f in several fingers: their entries of W are the
+sums of what the fingers give, and so are their P and O.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -28,6 +31,7 @@ from ccr_ros.model.sqp import Bounds
 
 from .assembly import GraspPoint, Hand
 from .elimination import System, Task, eliminated, made_definite, upright
+from .shared import shared_rows
 from .surface import surface_of
 
 # Weights of the augmentation (as in ccr_ros.model.sqp), in turn until the matrix is definite; in
@@ -48,12 +52,14 @@ class Step:
         body: (6,) of q.
         multipliers: Per finger (C + c,), in the finger's own units.
         friction: Per finger (g, 2), of its `FrictionRows`, in the finger's own units.
+        disks: (k,) forces of the pairs of disks that are near each other, in the hand's units.
     """
 
     fingers: list[np.ndarray]
     body: np.ndarray
     multipliers: list[np.ndarray]
     friction: list[np.ndarray]
+    disks: np.ndarray
 
 
 def newton_step(
@@ -72,17 +78,30 @@ def newton_step(
         free: Whether the object moves; else its support holds it where it is.
         support: Stiffness of a support that gives way, in units; its force is in the load.
     """
+    sizes = [len(part.unbalanced) for part in at.blocks]
+    touching = (
+        np.empty(0, dtype=int) if at.near_disks is None else np.flatnonzero(at.near_disks.active)
+    )
     task = Task(
         hand, at, free, support,
         [part.point.slacks(bound) for part, bound in zip(at.blocks, bounds, strict=True)],
         [surface_of(part) for part in at.blocks],
+        shared_rows(at.near_disks, sizes, touching),
     )  # fmt: skip
     # Mostly the constraints that carry force go on doing so, and no others come to.
     pressed = [np.flatnonzero(part.point.active) for part in at.blocks]
     guess = _attempt(task, pressed, _held)
     if guess is not None and _keeps_off(task, guess):
         return guess
-    return _attempt(task, [np.arange(len(part.point.rows)) for part in at.blocks], None)
+    every = [np.arange(len(part.point.rows)) for part in at.blocks]
+    if at.near_disks is None or not len(at.near_disks):
+        return _attempt(task, every, None)
+    near = np.arange(len(at.near_disks))
+    found = _attempt(replace(task, shared=shared_rows(at.near_disks, sizes, near)), every, None)
+    if found is None and len(touching):
+        convex = shared_rows(at.near_disks, sizes, near, convex=True)
+        found = _attempt(replace(task, shared=convex), every, None)
+    return found
 
 
 Solve = Callable[..., np.ndarray | None]
@@ -106,7 +125,12 @@ def _keeps_off(task: Task, step: Step) -> bool:
         room = slack - part.point.rows @ way - part.columns @ step.body
         if float(np.where(pushed > 0, 0.0, room).min()) < -_ROUNDING:
             return False
-    return True
+    near_disks = task.at.near_disks
+    if near_disks is None or not len(near_disks):
+        return True
+    closing = sum(rows @ way for rows, way in zip(near_disks.rows, step.fingers, strict=True))
+    room = np.where(step.disks > 0, 0.0, near_disks.near.gaps - closing)
+    return float(room.min()) >= -_ROUNDING
 
 
 def _held(
@@ -125,7 +149,8 @@ def _held(
 def _solved(task: Task, chosen: list[np.ndarray], system: System, solve: Solve) -> Step | None:
     """The step and the constraints' forces."""
     order = [i for stack in system.stacks for i in stack.members]
-    counts = [len(chosen[i]) + len(task.surfaces[i].ways) for i in order]
+    shared = task.shared
+    counts = [len(chosen[i]) + len(task.surfaces[i].ways) + len(shared) for i in order]
     ends = np.cumsum([0, *counts])
     total = int(ends[-1])
     residual = np.concatenate([stack.residual() for stack in system.stacks])
@@ -142,9 +167,18 @@ def _solved(task: Task, chosen: list[np.ndarray], system: System, solve: Solve) 
         by_slope = system.inverse @ system.right
         gram += reach @ system.inverse @ back.T
         residual = residual + reach @ by_slope
+    sums = None
+    if len(shared):
+        sums = _sums(counts, len(shared))
+        gram, residual = sums @ gram @ sums.T, sums @ residual
+        residual[-len(shared) :] += shared.values
     found = _forces(task, chosen, order, gram, residual, solve)
     if found is None or not np.isfinite(found).all():
         return None
+    disks = np.zeros(0 if task.at.near_disks is None else len(task.at.near_disks))
+    if sums is not None:
+        disks[shared.gaps] = found[len(found) - len(shared) :][: len(shared.gaps)]
+        found = found @ sums
     if task.free:
         body_step = -(by_slope + system.inverse @ (back.T @ found))
     steps: list[np.ndarray] = [body_step] * len(order)
@@ -163,9 +197,22 @@ def _solved(task: Task, chosen: list[np.ndarray], system: System, solve: Solve) 
         normal = np.zeros(len(part.point.rows))
         normal[index] = own_forces[: len(index)]
         multipliers[i] = normal
-        across = np.einsum("s,sgi->gi", own_forces[len(index) :], surface.axes)
+        along = own_forces[len(index) : len(index) + len(surface.ways)]
+        across = np.einsum("s,sgi->gi", along, surface.axes)
         friction[i] = across + normal[part.friction.index, None] * surface.drag
-    return Step(steps, body_step, multipliers, friction)
+    return Step(steps, body_step, multipliers, friction, disks)
+
+
+def _sums(counts: Sequence[int], shared: int) -> np.ndarray:
+    """(r, m) 0 and 1: which of all fingers' m rows, shared ones last of each, are the same row."""
+    own = sum(counts) - shared * len(counts)
+    sums, first, row = np.zeros((own + shared, sum(counts))), 0, 0
+    for count in counts:
+        alone = np.arange(count - shared)
+        sums[row + alone, first + alone] = 1.0
+        sums[own:, first + count - shared : first + count] = np.eye(shared)
+        first, row = first + count, row + len(alone)
+    return sums
 
 
 def _forces(
@@ -177,23 +224,30 @@ def _forces(
     solve: Solve,
 ) -> np.ndarray | None:
     """Forces of rows: those along the surface by elimination, the others by complementarity."""
-    surfaces = [task.surfaces[i] for i in order]
-    active = np.concatenate([task.at.blocks[i].point.active[chosen[i]] for i in order])
-    if not any(len(s.ways) for s in surfaces):
+    surfaces, shared = [task.surfaces[i] for i in order], task.shared
+    active = np.concatenate(
+        [*(task.at.blocks[i].point.active[chosen[i]] for i in order), shared.active[~shared.along]]
+    )
+    if not any(len(s.ways) for s in surfaces) and not shared.along.any():
         return solve(0.5 * (gram + gram.T), residual, active)
     # Which rows are inequalities (lengths, normals), which are ways along the surface.
     along = np.concatenate(
         [
-            np.repeat([False, True], [len(chosen[i]), len(s.ways)])
-            for i, s in zip(order, surfaces, strict=True)
+            *(
+                np.repeat([False, True], [len(chosen[i]), len(s.ways)])
+                for i, s in zip(order, surfaces, strict=True)
+            ),
+            shared.along,
         ]
     )
     bound, way = np.flatnonzero(~along), np.flatnonzero(along)
     inner = gram[way[:, None], way]
     weights = np.repeat(task.hand.weights[order], [len(s.ways) for s in surfaces])
-    sticks = np.concatenate([s.sticks for s in surfaces])
+    joins = np.zeros(int(shared.along.sum()))
+    sticks = np.concatenate([*(s.sticks for s in surfaces), joins > 0])
     yields = np.concatenate([s.yields for s in surfaces]) / weights
-    kept = np.concatenate([s.forces for s in surfaces]) * weights
+    yields = np.concatenate([yields, shared.yields[shared.along]])
+    kept = np.concatenate([np.concatenate([s.forces for s in surfaces]) * weights, joins])
     soft = np.where(sticks, _YIELD * np.maximum(np.diag(inner), 1e-12), yields)
     inner = inner + np.diag(soft)
     # residual + W m + soft (m - kept) = 0 for rows that stick; kept does not count in slip
@@ -205,7 +259,8 @@ def _forces(
     across = gram[bound[:, None], way]
     left = gram[bound[:, None], bound] - across @ solved[:, 1:]
     value = residual[bound] - across @ solved[:, 0]
-    pushing = solve(left, value, active, bool(sticks.all()))
+    symmetric = all(s.sticks.all() for s in surfaces)
+    pushing = solve(left, value, active, symmetric)
     if pushing is None:
         return None
     found = np.zeros(len(residual))

@@ -16,6 +16,7 @@ from ccr_ros.model.sqp import ACTIVE, Bounds, violation
 
 from .assembly import FingerBlock, GraspPoint, Hand, derive, gather, held_anew
 from .body import Body
+from .disks import DiskRoom, press
 from .friction import settle
 from .meeting import Guess
 from .newton import Step, newton_step
@@ -50,6 +51,8 @@ class Way:
         heat: Energy that friction has given off [J].
         late: The time limit ended it.
         snapped: (3,) ways that the object went by itself, where its equilibrium ended [m].
+        through: The pair of disks (of `DiskRoom`) that would have gone through each other, if that
+            ended it.
     """
 
     point: GraspPoint
@@ -61,6 +64,7 @@ class Way:
     heat: float = 0.0
     late: bool = False
     snapped: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    through: int | None = None
 
 
 class Path:
@@ -73,6 +77,7 @@ class Path:
         friction_step: Largest change of a pull in one step while contacts have friction, as a
             share of the finger's length.
         free: Whether the object is; else its support holds it where it is.
+        room: The disks that press on each other; None: they pass through each other.
     """
 
     def __init__(
@@ -82,8 +87,10 @@ class Path:
         settings: SolverSettings,
         friction_step: float,
         free: bool,
+        room: DiskRoom | None = None,
     ) -> None:
         self.hand = hand
+        self.room = room
         self.body = body
         self.settings = settings
         self.friction_step = friction_step
@@ -140,8 +147,10 @@ class Path:
             leapt = (
                 found is not None and stood is None and self._leaps(way.point, found, size * change)
             )
-            if found is None or skipped or leapt:
-                if not skipped:
+            through = None if found is None else self._through(way.point, found)
+            if found is None or skipped or leapt or through is not None:
+                way.through = through
+                if not skipped and through is None:
                     asked = share - done if wasted == 0.0 else asked
                     wasted += way.iterations - tried
                 size = 0.5 * (share - done)
@@ -175,12 +184,18 @@ class Path:
 
         It slides as if without friction; where it rests friction holds it again, from nothing.
         """
-        slick = Path(self.hand, replace(self.body, friction=0.0), self.settings, 1.0, True)
+        slick = Path(
+            self.hand, replace(self.body, friction=0.0), self.settings, 1.0, True, self.room
+        )
         slick._deadline = self._deadline
         points = [part.point for part in way.point.blocks]
         guesses = [Guess(p.at.y, p.tensions, p.forces) for p in points]
         parts = derive(self.hand, slick.body, way.point.pose, guesses)
-        falling = Way(gather(self.hand, way.point.pose, parts, load), pulls)
+        near = way.point.near_disks
+        if near is not None:
+            parts = press(self.hand, parts, near)
+        start = gather(self.hand, way.point.pose, parts, load, near_disks=near)
+        falling = Way(start, pulls)
         found = slick._sinks(falling, pulls, load)
         way.iterations += falling.iterations
         way.substeps += falling.substeps
@@ -198,7 +213,7 @@ class Path:
                 return False
             self._stood, self._stiffness = way.point.pose, stiffness
             found = self._newton(way, self._sticking(way.point), target, load)
-            if found is None:
+            if found is None or self._through(way.point, found) is not None:
                 stiffness *= 4.0
                 if stiffness > _SUPPORT:
                     return False
@@ -209,7 +224,7 @@ class Path:
             if stiffness < _LOOSE:
                 self._stood, self._stiffness = None, 0.0
                 found = self._newton(way, way.point, target, load)
-                if found is not None:
+                if found is not None and self._through(way.point, found) is None:
                     way.point = self._settled(way, found)
                     return True
                 stiffness *= 8.0
@@ -230,6 +245,12 @@ class Path:
         shift = float(np.linalg.norm(end.pose.position - start.pose.position)) / self.hand.length
         turn = float(np.linalg.norm(turn_between(start.pose, end.pose)))
         return shift > _LEAP + _LEAP_GAIN * gain * change or turn > _LEAP_TURN
+
+    def _through(self, start: GraspPoint, end: GraspPoint) -> int | None:
+        """The pair of disks that goes through each other between two poses, if any does."""
+        if self.room is None or start.near_disks is None or end.near_disks is None:
+            return None
+        return self.room.passed(start.near_disks, end.near_disks)
 
     def _touches(self, at: GraspPoint) -> bool:
         return any(bool((part.point.forces[-1] > ACTIVE).any()) for part in at.blocks)
@@ -263,7 +284,8 @@ class Path:
     ) -> GraspPoint | None:
         """Solve for the equilibrium near a point; None if it is not found."""
         hand, tolerance = self.hand, self.settings.tolerance
-        at = gather(hand, start.pose, start.blocks, self._yielding(load, start.pose), self.free)
+        at = gather(hand, start.pose, start.blocks, self._yielding(load, start.pose), self.free,
+                    start.near_disks)  # fmt: skip
         bounds = [
             Bounds(p.length_bounds(u), np.zeros_like(part.point.forces))
             for p, u, part in zip(hand.problems, pulls, start.blocks, strict=True)
@@ -274,6 +296,8 @@ class Path:
                 violation(part.point, part.point.slacks(bound))
                 for part, bound in zip(at.blocks, bounds, strict=True)
             )
+            if at.near_disks is not None:
+                over = max(over, at.near_disks.violation())
             if at.residual <= tolerance and over <= tolerance:
                 pairs = zip(hand.problems, at.blocks, strict=True)
                 return None if any(meeting_disks(p, part.point) for p, part in pairs) else at
@@ -331,7 +355,13 @@ class Path:
             y = point.at.y + size * step.fingers[index]
             guesses.append(Guess(y, multipliers[:count], forces, hold))
         parts = derive(hand, self.body, pose, guesses)
-        return gather(hand, pose, parts, self._yielding(load, pose), self.free)
+        near_disks = None
+        if self.room is not None:
+            near_disks = self.room.near_disks(
+                [part.point for part in parts], at.near_disks, step.disks
+            )
+            parts = press(hand, parts, near_disks)
+        return gather(hand, pose, parts, self._yielding(load, pose), self.free, near_disks)
 
 
 def displaced(pose: Pose, motion: np.ndarray, length: float) -> Pose:

@@ -16,6 +16,7 @@ from ccr_ros.model.sqp import ACTIVE, KktPoint
 
 from .assembly import FingerBlock, Hand
 from .body import Body
+from .disks import DiskRoom, NearDisks, pair_in_words
 from .path import Way
 from .stability import STABLE, Stability
 
@@ -65,6 +66,29 @@ class ObjectContact:
 
 
 @dataclass(frozen=True, eq=False)
+class DiskContact:
+    """Two disks that press on each other, without friction, in the gripper's frame.
+
+    Attributes:
+        fingers: Names of the fingers they belong to; the same twice for a finger and itself.
+        disks: Their numbers, 0 at the base.
+        position: (3,) [m].
+        normal: (3,) from the first disk to the second.
+        force: [N] on the second disk along ``normal``; the first feels the opposite.
+    """
+
+    fingers: tuple[str, str]
+    disks: tuple[int, int]
+    position: np.ndarray
+    normal: np.ndarray
+    force: float
+
+    def in_words(self) -> str:
+        """Say it for people."""
+        return f"{pair_in_words(self.fingers, self.disks)} press on each other"
+
+
+@dataclass(frozen=True, eq=False)
 class GraspSolution:
     """Fingers and object in equilibrium; what takes long is put together when it is asked for.
 
@@ -87,6 +111,8 @@ class GraspSolution:
         snapped: (3,) [m] ways that the object went by itself in this solve, to another equilibrium
             where its own had ended; zero: it followed pulls and loads.
         message: What is wrong, and what to do; empty if nothing is.
+        disk_contacts: Where disks press on each other; empty if that is not looked after (see
+            `GraspSolver`).
     """
 
     hand: Hand
@@ -106,6 +132,7 @@ class GraspSolution:
     dissipated: float = 0.0
     snapped: np.ndarray = field(default_factory=lambda: np.zeros(3))
     message: str = field(default="")
+    disk_contacts: tuple[DiskContact, ...] = ()
 
     @cached_property
     def fingers(self) -> tuple[Solution, ...]:
@@ -176,6 +203,7 @@ def make_grasp_solution(
     target: list[np.ndarray],
     supported: bool,
     elapsed: float,
+    room: DiskRoom | None = None,
 ) -> GraspSolution:
     """Assemble the solution that a solve has ended at."""
     at = way.point
@@ -200,7 +228,8 @@ def make_grasp_solution(
         solve_time=elapsed,
         dissipated=way.heat,
         snapped=way.snapped,
-        message=_message(way, "" if stable else stability.softest),
+        message=_message(way, "" if stable else stability.softest, room),
+        disk_contacts=_disk_contacts(hand, at.near_disks, room),
     )
 
 
@@ -249,11 +278,43 @@ def _contacts(hand: Hand, body: Body, way: Way) -> tuple[ObjectContact, ...]:
     return tuple(sorted(found, key=lambda c: (c.finger, c.disk, c.point, c.cable)))
 
 
-def _message(way: Way, falls: str) -> str:
+def _disk_contacts(
+    hand: Hand, near_disks: NearDisks | None, room: DiskRoom | None
+) -> tuple[DiskContact, ...]:
+    if near_disks is None or room is None:
+        return ()
+    found = []
+    for k in np.flatnonzero(near_disks.active):
+        fingers, disks = room.names(int(near_disks.pairs[k]))
+        found.append(
+            DiskContact(
+                fingers,
+                disks,
+                position=near_disks.near.touch[k] * hand.length,
+                normal=near_disks.near.normals[k],
+                force=float(near_disks.forces[k]) * hand.energy / hand.length,
+            )
+        )
+    return tuple(found)
+
+
+def _message(way: Way, falls: str, room: DiskRoom | None) -> str:
     if way.reached is not None:
+        where = f"beyond {way.reached:.1%} of the way to the wanted pulls and loads"
+        if room is not None and way.through is not None:
+            disks = room.in_words(way.through)
+            return f"{disks} would go through each other {where}"
+        near_disks = way.point.near_disks
+        if room is not None and near_disks is not None and near_disks.active.any():
+            most = int(near_disks.pairs[near_disks.forces.argmax()])
+            return (
+                f"no equilibrium of fingers and object was found {where}: the fingers cannot hold"
+                " the object there, or disks slip off each other"
+                f" ({room.in_words(most)} press most)"
+            )
         return (
-            f"no equilibrium of fingers and object was found beyond {way.reached:.1%} of the way"
-            " to the wanted pulls and loads: the fingers cannot hold the object there"
+            f"no equilibrium of fingers and object was found {where}: the fingers cannot hold the"
+            " object there"
         )
     said = []
     if way.snapped.any():

@@ -18,6 +18,7 @@ from ccr_ros.model.solver import FingerSolver, Standing
 
 from .assembly import GraspPoint, Hand, derive, gather
 from .body import GRAVITY, Body
+from .disks import DiskRoom, DiskShape
 from .meeting import Guess
 from .path import Path, Way
 from .result import GraspSolution, make_grasp_solution
@@ -38,6 +39,7 @@ class GraspStanding:
     pulls: tuple[np.ndarray, ...]
     point: GraspPoint | None
     pressed: tuple[Standing, ...]
+    disks: DiskShape | None
 
 
 class GraspSolver:
@@ -56,6 +58,8 @@ class GraspSolver:
         gravity: (3,) [m/s^2] in the gripper's frame; default: the gripper points up.
         friction_step: Largest change of a pull in one step while something touches, as a share of
             the finger's length, where there is friction.
+        disks: What of the disks presses on those of other fingers, and on far ones of the same
+            finger; None: fingers pass through each other.
 
     Raises:
         InvalidValue: No finger, fingers whose stiffness is not known beside others, or a body
@@ -69,6 +73,7 @@ class GraspSolver:
         settings: SolverSettings | None = None,
         gravity: np.ndarray = GRAVITY,
         friction_step: float = 0.0025,
+        disks: DiskShape | None = None,
     ) -> None:
         if not fingers:
             raise InvalidValue("fingers", fingers, "at least one finger")
@@ -78,6 +83,7 @@ class GraspSolver:
         self.body = body
         self.gravity = checks.vector("gravity", gravity, 3, unit="m/s^2", largest=1e3)
         self.friction_step = checks.real("friction_step", friction_step, above=0, high=1)
+        self.room = None if disks is None else DiskRoom(self.hand, disks)
         self.supported = True
         self._outer = np.zeros(6)
         self._pulls = [np.zeros(len(m.finger.cables)) for m in fingers]
@@ -93,6 +99,11 @@ class GraspSolver:
     def pulls(self) -> dict[str, np.ndarray]:
         """Pulls [m] of each finger's cables, of the last pose."""
         return {n: p.copy() for n, p in zip(self.names, self._pulls, strict=True)}
+
+    @property
+    def disks(self) -> DiskShape | None:
+        """What of the disks presses on other disks; None: nothing."""
+        return None if self.room is None else self.room.shape
 
     @property
     def point(self) -> GraspPoint | None:
@@ -133,11 +144,10 @@ class GraspSolver:
         if moment is not None:
             outer[3:] = checks.vector("moment", moment, 3, unit="N m", largest=1e6)
         load = self._load(body, outer)
-        rough = self.body.friction > 0
-        if self.supported and not rough:
+        if self.supported and self.body.friction <= 0 and self.room is None:
             way = self._press(target, load)
         else:
-            way = self._press(self._pulls, load) if self._point is None else self._way()
+            way = self._from_rest(load) if self._point is None else self._way()
             if way.reached is None:
                 snaps = _SNAPS if snap and not self.supported else 0
                 self._path().walk(way, target, load, snaps=snaps)
@@ -145,7 +155,13 @@ class GraspSolver:
             self._accept(way.point, target)
             self.body, self._outer = replace(body, pose=way.point.pose), outer
         return make_grasp_solution(
-            self.hand, self.body, way, target, self.supported, time.perf_counter() - begin
+            self.hand,
+            self.body,
+            way,
+            target,
+            self.supported,
+            time.perf_counter() - begin,
+            self.room,
         )
 
     def let_go(self) -> GraspSolution:
@@ -164,7 +180,10 @@ class GraspSolver:
         if self.supported:
             load = self._point.load
             carried = self._point.unbalanced + load
-            way.point = gather(self.hand, self.body.pose, self._point.blocks, carried)
+            way.point = gather(
+                self.hand, self.body.pose, self._point.blocks, carried,
+                near_disks=self._point.near_disks,
+            )  # fmt: skip
             path = self._path(free=True)
             path.walk(way, self._pulls, load, stood=self.body.pose)
             if way.reached is not None and not way.late:
@@ -174,7 +193,13 @@ class GraspSolver:
             self._accept(way.point, self._pulls)
             self.body = replace(self.body, pose=way.point.pose)
         return make_grasp_solution(
-            self.hand, self.body, way, self._pulls, self.supported, time.perf_counter() - begin
+            self.hand,
+            self.body,
+            way,
+            self._pulls,
+            self.supported,
+            time.perf_counter() - begin,
+            self.room,
         )
 
     def support(self, pose: Pose | None = None) -> None:
@@ -190,9 +215,11 @@ class GraspSolver:
                 raise InvalidValue("pose", pose, "a Pose in the gripper's frame")
             self.body = replace(self.body, pose=pose)
             self._point = None
-        if self.body.friction > 0 and self._point is not None:
+        walks = self.body.friction > 0 or self.room is not None
+        if walks and self._point is not None:
             load, blocks = self._point.load, self._point.blocks
-            self._point = gather(self.hand, self.body.pose, blocks, load, free=False)
+            near_disks = self._point.near_disks
+            self._point = gather(self.hand, self.body.pose, blocks, load, False, near_disks)
         else:
             self._put()
         self.supported = True
@@ -208,13 +235,14 @@ class GraspSolver:
             tuple(self._pulls),
             self._point,
             tuple(solver.standing for solver in self._started),
+            self.disks,
         )
 
     def resume(self, standing: GraspStanding) -> None:
         """Go back, or over, to where a solver of the same fingers and settings stood.
 
         Raises:
-            InvalidValue: It is of other fingers, or discretised otherwise.
+            InvalidValue: It is of other fingers or disks, or discretised otherwise.
         """
         same = len(standing.hand.mounted) == len(self.hand.mounted) and all(
             a.finger is b.finger and a.base is b.base
@@ -223,6 +251,8 @@ class GraspSolver:
         if not same:
             names = ", ".join(m.finger.name for m in standing.hand.mounted)
             raise InvalidValue("standing", names, f"of a solver of {', '.join(self.names)}")
+        if standing.disks != self.disks:
+            raise InvalidValue("standing", standing.disks, f"with disks={self.disks}")
         for solver, stood in zip(self._started, standing.pressed, strict=True):
             solver.resume(stood)
         self.body, self.supported = standing.body, standing.supported
@@ -263,7 +293,7 @@ class GraspSolver:
 
     def _path(self, free: bool | None = None) -> Path:
         free = not self.supported if free is None else free
-        return Path(self.hand, self.body, self.settings, self.friction_step, free)
+        return Path(self.hand, self.body, self.settings, self.friction_step, free, self.room)
 
     def _way(self) -> Way:
         assert self._point is not None
@@ -289,9 +319,20 @@ class GraspSolver:
             point = solver.point
             guesses.append(Guess(point.at.y, point.tensions, point.forces))
         parts = derive(self.hand, self.body, self.body.pose, guesses)
-        start = gather(self.hand, self.body.pose, parts, load, free=False)
+        near_disks = None
+        if self.room is not None:
+            near_disks = self.room.near_disks([part.point for part in parts])
+        start = gather(self.hand, self.body.pose, parts, load, free=False, near_disks=near_disks)
         way = Way(self._path().settled(start), target)
         way.reached, way.iterations = reached, iterations
+        return way
+
+    def _from_rest(self, load: np.ndarray) -> Way:
+        """Where fingers stand by themselves; at rest where their disks would cut each other."""
+        way = self._press(self._pulls, load)
+        near_disks = way.point.near_disks
+        if near_disks is not None and near_disks.violation() > 0 and way.reached is None:
+            way = self._press([np.zeros_like(pulls) for pulls in self._pulls], load)
         return way
 
     def _accept(self, point: GraspPoint, pulls: list[np.ndarray]) -> None:

@@ -89,8 +89,15 @@ class Stability:
 
     def _definite(self, bound: float, augment: float) -> bool:
         """Whether H - bound + augment A'A is positive definite."""
-        stacks, corner = self._augmented(augment, bound)
         try:
+            if self._joined:
+                rows = self._constraints
+                size = np.einsum("ij,ij->i", rows, rows)
+                whole = self._hessian + (rows.T * (augment / np.maximum(size, 1e-12))) @ rows
+                whole.flat[:: len(whole) + 1] -= bound
+                np.linalg.cholesky(whole)
+                return True
+            stacks, corner = self._augmented(augment, bound)
             for _, matrix, border in stacks:
                 if self.supported:
                     np.linalg.cholesky(matrix)
@@ -136,15 +143,21 @@ class Stability:
     def _softest(self) -> tuple[float, np.ndarray]:
         """The smallest eigenvalue and its vector (fingers, then q)."""
         basis = self._basis()
-        for augment in _AUGMENT:
+        for augment in () if self._joined else _AUGMENT:
             if self._definite(0.0, augment):
                 found = self._by_inverse(basis, augment)
                 if found is not None:
                     return found
         return self._by_decomposition(basis)
 
-    def _basis(self) -> np.ndarray:
-        """Orthonormal basis (total, r) of the constraints' gradients."""
+    @property
+    def _joined(self) -> bool:
+        """Whether fingers press on each other: there are no blocks then to go by."""
+        return self.at.near_disks is not None and bool(self.at.near_disks.active.any())
+
+    @cached_property
+    def _constraints(self) -> np.ndarray:
+        """(r, total) all that keeps its value, by the fingers' coordinates and q."""
         sizes = [problem.size for problem in self.hand.problems]
         total, first, rows = sum(sizes) + 6, 0, []
         for part, size in zip(self.at.blocks, sizes, strict=True):
@@ -155,8 +168,17 @@ class Stability:
             first += size
         idle = np.zeros((len(self._held), total))
         idle[:, -6:] = self._held
-        constraints = np.concatenate([*rows, idle])
-        return row_space(constraints) if len(constraints) else np.zeros((total, 0))
+        rows.append(idle)
+        near_disks = self.at.near_disks
+        if near_disks is not None and self._joined:
+            gaps = np.concatenate([row[near_disks.active] for row in near_disks.rows], axis=1)
+            rows.append(np.concatenate([gaps, np.zeros((len(gaps), 6))], axis=1))
+        return np.concatenate(rows)
+
+    def _basis(self) -> np.ndarray:
+        """Orthonormal basis (total, r) of the constraints' gradients."""
+        rows = self._constraints
+        return row_space(rows) if len(rows) else np.zeros((rows.shape[1], 0))
 
     def _by_inverse(self, basis: np.ndarray, augment: float) -> tuple[float, np.ndarray] | None:
         """The pair from the inverse of the reduced Hessian, of which it is the largest.
@@ -187,9 +209,11 @@ class Stability:
         found = largest_pair(lambda x: solved(x) - back @ (held.T @ x), len(basis))
         return None if found is None else (1.0 / found[0], found[1])
 
-    def _by_decomposition(self, basis: np.ndarray) -> tuple[float, np.ndarray]:
-        """The pair out of all of the reduced Hessian's, whatever their signs."""
-        matrix, first = np.zeros((len(basis), len(basis))), 0
+    @cached_property
+    def _hessian(self) -> np.ndarray:
+        """(total, total) of the fingers' coordinates and q, as it is."""
+        total, first = sum(problem.size for problem in self.hand.problems) + 6, 0
+        matrix = np.zeros((total, total))
         for weight, part in zip(self.hand.weights, self.at.blocks, strict=True):
             own = slice(first, first + len(part.border))
             matrix[own, own] = weight * part.point.hessian
@@ -197,8 +221,15 @@ class Stability:
             matrix[-6:, own] = matrix[own, -6:].T
             matrix[-6:, -6:] += weight * part.corner
             first += len(part.border)
+        if self.at.near_disks is not None and self._joined:
+            ways = np.concatenate(self.at.near_disks.ways, axis=1)
+            matrix[:-6, :-6] += (ways.T * self.at.near_disks.stiffness) @ ways
+        return matrix
+
+    def _by_decomposition(self, basis: np.ndarray) -> tuple[float, np.ndarray]:
+        """The pair out of all of the reduced Hessian's, whatever their signs."""
         null = np.linalg.qr(basis, mode="complete")[0][:, basis.shape[1] :]
-        values, vectors = np.linalg.eigh(null.T @ matrix @ null)
+        values, vectors = np.linalg.eigh(null.T @ self._hessian @ null)
         return float(values[0]), null @ vectors[:, 0]
 
 
