@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from ccr_ros.grasp.live import LiveGrasp
-from ccr_ros.grasp.statics import Body, sphere_body
+from ccr_ros.grasp.statics import Body, DiskShape, sphere_body
 from ccr_ros.model import Box, InvalidValue, Pose, SolverSettings, load_gripper
 from ccr_ros.resources import find_config
 
@@ -243,3 +243,12 @@ def test_what_fails_while_fingers_press_is_tried_again(carried):
     assert carried.failure and not carried.lost and carried.solution is before
     assert carried.want(carried.body.pose, 0.01, True)
     assert opening(carried, 0.0).converged and carried.held
+
+
+def test_disks_press_on_each_other_where_they_shall(fingers):
+    body = sphere_body(0.01, pose=Pose(np.array([0.0, 0.0, 0.5])))
+    disks = DiskShape(rim=0.0015)
+    live = LiveGrasp(fingers, body, SolverSettings(time_limit=20.0), UPWARDS, disks=disks)
+    assert len(pull(live, 0.047 * 0.182).disk_contacts) == 3
+    copy = live.copy(1.0)
+    assert copy.disks == disks and len(copy.solve({}).disk_contacts) == 3
