@@ -378,6 +378,29 @@ def test_a_finger_rolls_up_onto_itself():
     assert abs(places[1]) < 0.003 and places[2] == pytest.approx(-0.004, abs=1e-4)
 
 
+@pytest.mark.parametrize(("name", "least"), [("gripper_cube", 0.0), ("gripper_sphere", 0.038)])
+def test_no_pose_that_converged_has_disks_in_each_other(name, least):
+    """Random pulls, small steps and large ones; `disk_clearance` finds gaps in another way."""
+    rng, shape = np.random.default_rng(4), DiskShape(rim=0.0015)
+    fingers = load_gripper(find_config(name)).fingers
+    solver, length = solver_of(fingers, shape), fingers[0].finger.length
+    bases = [m.base for m in fingers]
+    pressed = 0
+    for k in range(16):
+        size = 0.02 if k % 4 == 0 else 0.004
+        pulls = {n: p + size * length * rng.normal(size=len(p)) for n, p in solver.pulls.items()}
+        pulls = {n: np.clip(p, least * length, 0.08 * length) for n, p in pulls.items()}
+        solution = solver.solve(pulls)
+        if not solution.converged:
+            continue
+        pressed += bool(solution.disk_contacts)
+        clear = disk_clearance(solution.fingers, bases, rim=shape.rim - shape.thickness / 2)
+        assert clear.gap > shape.thickness - 2e-6
+        assert solution.residual < 1e-9
+        assert all(c.force > 0 for c in solution.disk_contacts)
+    assert pressed >= 2
+
+
 @pytest.mark.parametrize(
     ("values", "place"),
     [
