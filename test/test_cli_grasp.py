@@ -83,6 +83,17 @@ def test_what_falls_is_not_held(ccr):
     assert code == 1 and "NOT HELD" in out and "nothing touches the object" in out
 
 
+def test_fingers_that_pass_through_each_other_hold_nothing(ccr):
+    words = (*BALL, "--mass", "0.02", "--pull", "0.1")
+    code, out, _ = ccr(*words)
+    assert code == 1 and "NOT HELD" in out
+    assert "disk 3 of finger_1 and disk 3 of finger_2 meet" in out
+    code, out, _ = ccr(*words, "--json")
+    found = strict_json(out)
+    assert found["converged"] and found["stable"] and not found["held"]
+    assert found["clearance"] == {"gap": 0, "fingers": ["finger_1", "finger_2"], "disks": [3, 3]}
+
+
 def test_pulls_are_of_all_fingers_of_a_cable_or_of_one():
     fingers = load_gripper(find_config("gripper_sphere")).fingers
     solver = GraspSolver(fingers, sphere_body(0.112, pose=Pose(np.array([0, 0, 0.110]))))
@@ -128,6 +139,8 @@ def _write_box(path, size):
         ((*BALL, "--pull", "150%"), "pulls.finger_1.main"),
         ((*BALL[:4], "inf", "--pull", "3%"), "--center-height"),
         (("gripper_sphere", "--object", "pear", *BALL[3:], "--pull", "3%"), "pear"),
+        (("gripper_sphere", "--object", "pear", *BALL[3:], "--pull", "3%"), "mesh:FILE.stl"),
+        (("gripper_sphere", "--object", "mesh:", *BALL[3:], "--pull", "3%"), "--object"),
         (("gripper_sphere", "--object", "mesh:no.stl", *BALL[3:], "--pull", "3%"), "no.stl"),
         (("helical", *BALL[1:], "--pull", "3%"), "gripper file is wanted"),
         (("no_such", *BALL[1:], "--pull", "3%"), "no_such"),

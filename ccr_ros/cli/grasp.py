@@ -5,7 +5,9 @@ GRIPPER is a gripper file or the name of one in config/ (gripper_sphere). OBJECT
 sphere:DIAMETER, cylinder:DIAMETERxHEIGHT, box:LENGTHxWIDTHxHEIGHT, or mesh:FILE.stl (convex, in
 millimetres), upright, its centre --center-height above the plane of the fingers' bases. It stands
 on its support while the fingers close; then the support goes, and fingers and object find their
-equilibrium, with friction. Lengths in m. Exit code: 0 the object is held, 1 it is not, 2 bad input.
+equilibrium, with friction. Nothing keeps fingers from passing through each other: where disks meet
+the object does not count as held, and the disks are named. Lengths in m. Exit code: 0 the object is
+held, 1 it is not, 2 bad input.
 
   ccr grasp gripper_sphere --object sphere:0.112 --center-height 0.110 --mass 0.02 --friction 0.5 \\
       --pull 3.2%
@@ -24,6 +26,7 @@ from ccr_ros.cli.grasp_arguments import add_body_arguments, body_from_args, grav
 from ccr_ros.cli.grasp_report import Findings, report, to_dict
 from ccr_ros.cli.options import number
 from ccr_ros.cli.solve import parse_pull
+from ccr_ros.grasp.clearance import disk_clearance
 from ccr_ros.grasp.quality import compliance_of, payload_until_slip, quality_of
 from ccr_ros.grasp.statics import DiskShape, GraspSolver
 from ccr_ros.model import InvalidValue, SolverSettings, UnknownName, load_gripper
@@ -70,7 +73,9 @@ def run(args: argparse.Namespace) -> int:
     solution = solver.solve(parse_grip(args.pull, solver))
     if solution.converged:
         solution = solver.let_go()
+    clearance = disk_clearance(solution.fingers, [m.base for m in gripper.fingers])
     held = solution.converged and solution.stable and not solution.supported
+    held = held and not clearance.touching
     quality = compliance = loads = None
     if solution.converged and solution.contacts:
         quality = quality_of(solution, gravity=gravity)
@@ -78,7 +83,7 @@ def run(args: argparse.Namespace) -> int:
         compliance = compliance_of(solver)
         if args.until_slip:
             loads = payload_until_slip(solver)
-    findings = Findings(gripper.name, solution, held, quality, compliance, loads)
+    findings = Findings(gripper.name, solution, held, clearance, quality, compliance, loads)
     print(json.dumps(to_dict(findings)) if args.json else report(findings))
     return 0 if held else 1
 

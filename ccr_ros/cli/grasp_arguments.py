@@ -11,9 +11,10 @@ import numpy as np
 from ccr_ros.cli.options import number
 from ccr_ros.design.curve_text import object_from_text
 from ccr_ros.grasp.statics import Body, box_body, cylinder_body, mesh_body, sphere_body
-from ccr_ros.model import ConvexMesh, Pose
+from ccr_ros.model import ConvexMesh, InvalidValue, Pose, UnknownName
 
 _STANDARD = 9.80665
+_MESH = "mesh:FILE.stl"
 _DOWN = {  # gravity in the frame of a gripper that points so
     "up": np.array([0.0, 0.0, -_STANDARD]),
     "down": np.array([0.0, 0.0, _STANDARD]),
@@ -68,9 +69,14 @@ def body_from_text(text: str, pose: Pose, mass: float, friction: float) -> Body:
         InvalidFile, MissingPackage: A mesh cannot be read.
     """
     if text.startswith("mesh:"):
-        mesh = ConvexMesh.from_stl(text.removeprefix("mesh:"), 1e-3)
-        return mesh_body(mesh, mass, pose, friction)
-    sized = object_from_text(text)
+        file = text.removeprefix("mesh:")
+        if not file:
+            raise InvalidValue("--object", text, _MESH)
+        return mesh_body(ConvexMesh.from_stl(file, 1e-3), mass, pose, friction)
+    try:
+        sized = object_from_text(text)
+    except UnknownName as error:
+        raise UnknownName(error.kind, error.name, (*error.valid, _MESH)) from None
     if sized.kind == "sphere":
         return sphere_body(sized.size[0], mass, pose, friction)
     if sized.kind == "cylinder":

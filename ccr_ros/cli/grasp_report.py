@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ccr_ros.grasp.clearance import DiskClearance
 from ccr_ros.grasp.quality import Compliance, GraspQuality, SlipLoads
 from ccr_ros.grasp.statics import GraspSolution
 
@@ -20,13 +21,15 @@ class Findings:
     Attributes:
         gripper: Its name.
         solution: After the object was let go, or where that failed.
-        held: The fingers alone hold the object, stable.
+        held: The fingers alone hold the object, stable, and do not pass through each other.
+        clearance: How near the fingers' disks come to each other.
         quality, compliance, loads: None where they were not asked for, or cannot be.
     """
 
     gripper: str
     solution: GraspSolution
     held: bool
+    clearance: DiskClearance
     quality: GraspQuality | None
     compliance: Compliance | None
     loads: SlipLoads | None
@@ -68,6 +71,8 @@ def report(found: Findings) -> str:
     )
     if solution.message:
         lines.append(f"  {solution.message}")
+    if found.clearance.touching:
+        lines.append(f"  {found.clearance.in_words()}, of which the equilibrium knows nothing")
     return "\n".join(lines)
 
 
@@ -152,6 +157,8 @@ def to_dict(found: Findings) -> dict[str, Any]:
             for d in solution.disk_contacts
         ],
     }
+    near = found.clearance
+    result["clearance"] = {"gap": near.gap, "fingers": near.fingers, "disks": near.disks}
     if found.quality is not None:
         q = found.quality
         result["quality"] = {
