@@ -143,6 +143,9 @@ def test_bad_values_are_named():
     ):
         with pytest.raises(InvalidValue, match=named):
             largest_load(contacts, CENTRE, *args)
+    for bad in ([0, 0], None, "here", [0, 0, np.nan]):
+        with pytest.raises(InvalidValue, match="centre"):
+            largest_load(contacts, bad, DOWN)
 
 
 def test_without_scipy_the_extra_is_named(monkeypatch):

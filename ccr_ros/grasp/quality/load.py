@@ -68,12 +68,13 @@ def largest_load(
         MissingPackage: scipy is not installed.
     """
     tolerance = checks.real("tolerance", tolerance, low=1e-7, high=1)
+    middle = checks.vector("centre", centre, 3, unit="m", largest=1e3)
     push = checks.vector("force", force, 3, unit="N", largest=1e6)
     turn = checks.vector("moment", np.zeros(3) if moment is None else moment, 3, unit="N m",
                          largest=1e6)  # fmt: skip
     # A moment needs no length here; that of the contacts keeps the program's numbers alike.
-    at_centre = all(np.allclose(c.position, centre, atol=1e-9, rtol=0) for c in contacts)
-    wrenches = contact_wrenches(contacts, centre, 1.0 if at_centre else None)
+    at_centre = all(np.allclose(c.position, middle, atol=1e-9, rtol=0) for c in contacts)
+    wrenches = contact_wrenches(contacts, middle, 1.0 if at_centre else None)
     load = np.concatenate([push, turn / wrenches.length])
     size = float(np.linalg.norm(load))
     if size < 1e-12:
