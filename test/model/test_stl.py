@@ -50,6 +50,12 @@ def test_a_box_in_millimetres(stl, text):
     assert centred.name == "box"
 
 
+def test_a_text_may_bear_a_name_in_an_older_encoding(stl):
+    text = stl(box_mesh(), text=True).read_bytes().split(b"\n", 1)[1]
+    mesh = ConvexMesh.from_stl(stl("solid W\u00fcrfel\n".encode("latin-1") + text), 0.001)
+    assert len(mesh.vertices) == 8
+
+
 def test_a_turned_body_of_many_triangles_has_distances_like_trimesh(stl):
     ball = trimesh.creation.icosphere(subdivisions=2, radius=40)
     ball.apply_transform(trimesh.transformations.rotation_matrix(0.7, [1, 2, 3]))

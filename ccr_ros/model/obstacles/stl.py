@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import io
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -36,9 +37,13 @@ def read_stl(path: str | Path, scale: float) -> tuple[np.ndarray, np.ndarray]:
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise InvalidFile(path, f"cannot be read: {reason}") from None
+    load = partial(trimesh.load_mesh, file_type="stl")
     try:
         with np.errstate(all="ignore"):  # numbers are checked below
-            mesh = trimesh.load_mesh(io.BytesIO(content), file_type="stl")
+            try:
+                mesh = load(io.BytesIO(content))
+            except ImportError:  # of what trimesh guesses the encoding of a name or comment with
+                mesh = load(io.BytesIO(content.decode("ascii", "replace").encode()))
     except Exception as error:  # trimesh raises whatever its parser stumbles over
         raise InvalidFile(path, f"is no STL file ({_line(error)})") from None
     vertices, faces = np.asarray(mesh.vertices, float), np.asarray(mesh.faces, int)
