@@ -2,6 +2,7 @@
 """The pieces of the cube's demo; test_demo_cube_run.py runs the whole."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -60,6 +61,14 @@ def test_the_summary_tells_turns_margins_and_forces(recording):
     assert "20.0 deg to the left and 20.0 deg to the right" in lines[-3]
     assert "smallest friction margin on the way 0.30 (at 6.0 s" in lines[-2]
     assert "0.1 N" in lines[-1]
+
+
+def test_where_the_margin_is_not_told_it_is_not_the_smallest(recording):
+    frames = list(recording.frames)
+    contact = replace(frames[5].grip.contacts[0], margin=None)
+    frames[5] = replace(frames[5], grip=replace(frames[5].grip, contacts=(contact,)))
+    lines = cube_lines(replace(recording, frames=frames))
+    assert "smallest friction margin on the way 0.30 (at 6.0 s" in lines[-2]
 
 
 def test_a_recording_keeps_what_it_knows_of_the_grip(recording):

@@ -6,8 +6,6 @@ from __future__ import annotations
 import math
 from itertools import pairwise
 
-import numpy as np
-
 from ccr_ros.viz.figures import force_unit
 from ccr_ros.viz.recording import Frame, Recording
 
@@ -55,7 +53,7 @@ def _in_all(recording: Recording, unit: str) -> list[str]:
     left, right = math.degrees(max(turns)), -math.degrees(min(turns))
     lines = [f"turned by up to {left:.1f} deg to the left and {right:.1f} deg to the right"]
     if margins := _margins(carried):
-        at = carried[int(np.argmin([f.grip.margin or 0.0 for f in carried if f.grip]))].time
+        at = next(f.time for f in carried if _margins([f]) == [min(margins)])
         lines.append(
             f"carried for {carried[-1].time - carried[0].time:.1f} s; smallest friction margin on"
             f" the way {min(margins):.2f} (at {at:.1f} s; it slips at 0)"

@@ -213,7 +213,7 @@ def record_turn(result: TurnResult) -> TurnRecord:
         for way in result.ways:
             solver.resume(begin)
             own = [_row(solver, waypoint) for waypoint in way.plan.waypoints]
-            rows = own[:0:-1] + rows if way.plan.moved[5] < 0 else rows + own
+            rows = own[:0:-1] + rows if way.plan.target.turn[2] < 0 else rows + own
     finally:
         solver.resume(begin)
     cables = tuple(

@@ -67,6 +67,14 @@ def test_a_record_goes_from_one_end_to_the_other_through_the_hold(turned):
     assert record.pulls.shape == (len(record.angles), 4)
 
 
+def test_a_record_of_one_way_alone_does_not_come_back(turned):
+    """Where the turn to the right does not get on at all the hold is not told twice."""
+    left, right = turned.ways
+    stuck = replace(right, plan=replace(right.plan, waypoints=right.plan.waypoints[:1]))
+    record = record_turn(replace(turned, ways=(left, stuck)))
+    np.testing.assert_allclose(record.angles, [w.moved[5] for w in left.plan.waypoints])
+
+
 def test_the_solver_stays_at_the_hold(turned):
     here = turned.solver.solve({})
     np.testing.assert_allclose(here.body.pose.position, turned.hold.body.pose.position, atol=1e-9)
