@@ -5,9 +5,9 @@ GRIPPER is a gripper file or the name of one in config/ (gripper_sphere). OBJECT
 sphere:DIAMETER, cylinder:DIAMETERxHEIGHT, box:LENGTHxWIDTHxHEIGHT, or mesh:FILE.stl (convex, in
 millimetres), upright, its centre --center-height above the plane of the fingers' bases. It stands
 on its support while the fingers close; then the support goes, and fingers and object find their
-equilibrium, with friction. Nothing keeps fingers from passing through each other: where disks meet
-the object does not count as held, and the disks are named. Lengths in m. Exit code: 0 the object is
-held, 1 it is not, 2 bad input.
+equilibrium, with friction. Without --disks nothing keeps fingers from passing through each other:
+where they do the object does not count as held, and the disks are named. Lengths in m. Exit code: 0
+the object is held, 1 it is not, 2 bad input.
 
   ccr grasp gripper_sphere --object sphere:0.112 --center-height 0.110 --mass 0.02 --friction 0.5 \\
       --pull 3.2%

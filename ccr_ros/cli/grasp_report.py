@@ -72,7 +72,8 @@ def report(found: Findings) -> str:
     if solution.message:
         lines.append(f"  {solution.message}")
     if found.clearance.touching:
-        lines.append(f"  {found.clearance.in_words()}, of which the equilibrium knows nothing")
+        near = found.clearance.in_words()
+        lines.append(f"  {near}, of which this equilibrium knows nothing; with --disks it does")
     return "\n".join(lines)
 
 
