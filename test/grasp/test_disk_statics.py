@@ -420,8 +420,9 @@ def test_disks_that_cut_each_other_at_rest_are_refused():
     with pytest.raises(InvalidValue, match="disk 0 of finger_1 and disk 0 of finger_2") as error:
         solver_of(around(2, 0.007))
     assert "at rest" in str(error.value)
-    with pytest.raises(InvalidValue, match=r"disks\.thickness"):
-        solver_of(around(2, 0.03), DiskShape(thickness=0.02))
+    for thickness in (0.02, 0.00007):
+        with pytest.raises(InvalidValue, match=r"disks\.thickness.* 8e-05 to 0.008 m"):
+            solver_of(around(2, 0.03), DiskShape(thickness=thickness))
 
 
 def test_off_by_default():

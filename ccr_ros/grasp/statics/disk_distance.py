@@ -13,7 +13,8 @@ millimetres): it makes the nearest points unique and the gap smooth where disks 
 it chooses the middle of what overlaps. Rims keep their places, and the gap is never overestimated.
 
 The minimum is one of a strictly convex function: a semismooth Newton method on
-p = P(p - step * gradient), P the projection onto both cores, safeguarded by the projected gradient.
+p = P(p - step * gradient), P the projection onto both cores, takes the best of its own step, parts
+of it, and the projected gradient's.
 By the envelope theorem the gap's derivative is that of |b - a| with a and b fixed on their disks,
 n.(db - da). With K_wp and K_pp the mixed and second derivatives by p along the cores (on a rim:
 along the rim), the second derivative is that with a and b fixed, less K_wp K_pp^-1 K_pw.
@@ -29,10 +30,10 @@ from ccr_ros.model.rotation import cross
 
 DOME = 2e-3  # slope of the faces at the rim; a pair of faces is so much of a radius thicker
 _STEPS = 60
-_EASY = 3  # steps that mostly are enough; then shorter ones are tried, too:
-_SHARES = (1.0, 0.25, 0.06, 0.015)
+_EASY = 3  # steps that mostly are enough; then shorter ones are tried, too
+_SHARES = (1.0, 0.25, 0.06, 0.015)  # of Newton's steps
 _EXACT = 1e-11  # of the cores' radii: change of the nearest points at which they are found
-_CUT = 1e-6  # of the cores' radii; a distance of cores below which no normal is defined
+_CUT = 1e-4  # of the cores' radii; cores that are nearer cut each other
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,6 +29,7 @@ from .disk_distance import DOME, Disks, Nearest, between, gaps_at_least, nearest
 from .disk_motion import DiskMotion
 
 _BAND = 0.05  # of the length; disks nearer to each other than this enter the problem
+_THIN = 0.01  # of the radius; a rim that is sharper has no normal to speak of
 _LOOKS = 32  # at most, at disks on their way
 
 
@@ -100,15 +101,16 @@ class DiskRoom:
             those of one finger that are no neighbours.
 
     Raises:
-        InvalidValue: Disks are thicker than wide, or cut each other at rest.
+        InvalidValue: Disks are too thin or too thick for their radius, or cut each other at rest.
     """
 
     def __init__(self, hand: Hand, shape: DiskShape) -> None:
         self.shape = shape
         edge = 0.5 * shape.thickness
         cores = [m.finger.disk_radius + shape.rim - edge for m in hand.mounted]
-        if min(cores) < edge:
-            allowed = f"at most the disks' radius, {min(cores) + edge:.4g} m"
+        least, most = _THIN * (max(cores) + edge), min(cores) + edge
+        if not least <= shape.thickness <= most:
+            allowed = f"{_THIN:.0%} to 100% of the disks' radius, {least:.4g} to {most:.4g} m"
             raise InvalidValue("disks.thickness", shape.thickness, allowed)
         self._motion = DiskMotion(hand, cores, edge)
         self._names = [m.finger.name for m in hand.mounted]
