@@ -16,6 +16,8 @@ from functools import lru_cache
 import casadi as ca
 import numpy as np
 
+from .lemke import lemke
+
 # T L^2 / EI; a straight finger pulled by 5 % has 25. Beyond this the shift below is what answers,
 # because the constraints contradict each other.
 _LARGEST = 1e8
@@ -40,7 +42,8 @@ def solve_multipliers(
         return guess
     if not symmetric:
         found = _pivoted(s, t, active)
-        if found is not None:
+        found = lemke(s, t) if found is None else found
+        if found is not None and float(found.max()) < _LARGEST:
             return found
         s = 0.5 * (s + s.T)  # near enough to go on from
     unit = 1.0 / np.sqrt(np.maximum(np.diag(s), 1e-300))
@@ -77,15 +80,19 @@ def _daqp(size: int) -> ca.Function:
 
 
 def _pivoted(s: np.ndarray, t: np.ndarray, active: np.ndarray) -> np.ndarray | None:
-    """Multipliers by principal pivots (Murty's least index, worst first while that gets on)."""
+    """Multipliers by principal pivots from a guess, worst first; None where these go round."""
     count = len(t)
-    inside = active.copy()
+    inside, seen = active.copy(), set()
     tolerance = 1e-12 * max(1.0, float(np.abs(t).max()))
-    for turn in range(4 * count + 4):
+    diagonal = np.diag(s)
+    shift, unit = 1e-12 * np.abs(diagonal), np.sqrt(np.maximum(diagonal, 1e-300))
+    while (state := inside.tobytes()) not in seen:
+        seen.add(state)
         index = np.flatnonzero(inside)
         multipliers = np.zeros(count)
         if len(index):
-            block = s[index[:, None], index] + 1e-12 * np.diag(np.abs(np.diag(s))[index])
+            block = s[index[:, None], index]
+            block[np.arange(len(index)), np.arange(len(index))] += shift[index]
             try:
                 multipliers[index] = np.linalg.solve(block, -t[index])
             except np.linalg.LinAlgError:
@@ -94,11 +101,8 @@ def _pivoted(s: np.ndarray, t: np.ndarray, active: np.ndarray) -> np.ndarray | N
         wrong = np.where(inside, multipliers, slack)
         wrong[~inside & (slack > -tolerance)] = 0.0
         if wrong.min() >= 0:
-            return multipliers if float(multipliers.max()) < _LARGEST else None
-        bad = np.flatnonzero(wrong < 0)
-        unit = np.sqrt(np.maximum(np.diag(s), 1e-300))
-        size = np.where(inside, wrong * unit, wrong / unit)  # alike in units
-        change = int(np.argmin(size)) if turn < 2 * count else int(bad[0])
+            return multipliers
+        change = int(np.argmin(np.where(inside, wrong * unit, wrong / unit)))  # alike in units
         inside[change] = not inside[change]
     return None
 

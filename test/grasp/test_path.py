@@ -14,13 +14,18 @@ from ccr_ros.resources import find_config
 FEW = 70
 
 
-def hanging():
-    """The paper's gripper upside down with a ball, without friction."""
+def sphere_gripper(friction, pull, gravity=-9.80665):
+    """The paper's gripper around a ball of 20 g that stands."""
     fingers = load_gripper(find_config("gripper_sphere")).fingers
-    ball = sphere_body(0.112, 0.02, Pose(np.array([0.0, 0.0, 0.110])))
-    solver = GraspSolver(fingers, ball, LONG, gravity=np.array([0.0, 0.0, 9.80665]))
-    solver.solve({name: [0.0059] for name in solver.names}).require_converged()
+    ball = sphere_body(0.112, 0.02, Pose(np.array([0.0, 0.0, 0.110])), friction)
+    solver = GraspSolver(fingers, ball, LONG, gravity=np.array([0.0, 0.0, gravity]))
+    solver.solve({name: [pull] for name in solver.names}).require_converged()
     return solver
+
+
+def hanging():
+    """It points down; without friction."""
+    return sphere_gripper(0.0, 0.0059, gravity=9.80665)
 
 
 LOST = {
@@ -99,3 +104,24 @@ def test_a_running_gripper_drops_what_would_snap():
     assert not live.solve(pulls).converged
     assert not live.held and live.failure.startswith("dropped: ")
     assert other.solve({}, mass=0.002).require_converged().snapped[2] < -0.01
+
+
+JAMS = {
+    "let go": (2.0, 0.0056, {"mass": 0.02}),
+    "pulled upwards": (0.5, 0.0056, {"force": [0.0, 0.0, 1.0]}),
+    "pushed aside": (0.8, 0.0056, {"force": [0.3, 0.0, 0.0]}),
+}
+
+
+@pytest.mark.parametrize("case", sorted(JAMS))
+def test_points_that_slip_beside_others_do_not_jam_the_search(case):
+    """All have an equilibrium; principal pivots went round, and the ball was taken for lost."""
+    friction, pull, load = JAMS[case]
+    solver = sphere_gripper(friction, pull)
+    solver.let_go().require_converged()
+    found = solver.solve({}, **load, snap=False).require_converged()
+    grip = sum(contact.force for contact in found.contacts)
+    assert np.abs(found.net_force).max() < 1e-6 * grip
+    for contact in found.contacts:
+        along = float(np.linalg.norm(contact.friction_force))
+        assert along <= friction * contact.force * (1 + 1e-6) + 1e-12
