@@ -2,13 +2,16 @@
 """`ccr grasp`, as typed by a person and as read by a program."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from ccr_ros.cli import grasp
 from ccr_ros.cli.grasp import parse_grip
 from ccr_ros.cli.grasp_arguments import body_from_text
 from ccr_ros.cli.main import main
+from ccr_ros.grasp.clearance import disk_clearance
 from ccr_ros.grasp.statics import GraspSolver, sphere_body
 from ccr_ros.model import Pose, load_gripper
 from ccr_ros.resources import find_config
@@ -186,3 +189,16 @@ def test_disks_that_press_on_each_other_are_told(ccr):
 def test_rims_that_cannot_be(ccr, rim, words):
     code, out, err = ccr(*CLOSED, f"--disks={rim}")
     assert code == 2 and not out and err.startswith("ccr: error: ") and words in err
+
+
+def test_disks_that_press_are_not_taken_for_fingers_that_pass_through(ccr, monkeypatch):
+    """Rims that press flat on each other are no distance apart, and are told as contacts."""
+
+    def meeting(*arguments):
+        return replace(disk_clearance(*arguments), gap=0.0)
+
+    monkeypatch.setattr(grasp, "disk_clearance", meeting)
+    code, out, _ = ccr(*DOWN)
+    assert code == 1 and "NOT HELD" in out and "knows nothing" in out
+    code, out, _ = ccr(*DOWN, "--disks")
+    assert code == 0 and "NOT HELD" not in out and "knows nothing" not in out

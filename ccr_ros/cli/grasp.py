@@ -75,7 +75,8 @@ def run(args: argparse.Namespace) -> int:
         solution = solver.let_go()
     clearance = disk_clearance(solution.fingers, [m.base for m in gripper.fingers])
     held = solution.converged and solution.stable and not solution.supported
-    held = held and not clearance.touching
+    through = disks is None and clearance.touching
+    held = held and not through
     quality = compliance = loads = None
     if solution.converged and solution.contacts:
         quality = quality_of(solution, gravity=gravity)
@@ -83,7 +84,9 @@ def run(args: argparse.Namespace) -> int:
         compliance = compliance_of(solver)
         if args.until_slip:
             loads = payload_until_slip(solver)
-    findings = Findings(gripper.name, solution, held, clearance, quality, compliance, loads)
+    findings = Findings(
+        gripper.name, solution, held, clearance, through, quality, compliance, loads
+    )
     print(json.dumps(to_dict(findings)) if args.json else report(findings))
     return 0 if held else 1
 

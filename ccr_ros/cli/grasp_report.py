@@ -23,6 +23,7 @@ class Findings:
         solution: After the object was let go, or where that failed.
         held: The fingers alone hold the object, stable, and do not pass through each other.
         clearance: How near the fingers' disks come to each other.
+        through: They meet, and the equilibrium does not know.
         quality, compliance, loads: None where they were not asked for, or cannot be.
     """
 
@@ -30,6 +31,7 @@ class Findings:
     solution: GraspSolution
     held: bool
     clearance: DiskClearance
+    through: bool
     quality: GraspQuality | None
     compliance: Compliance | None
     loads: SlipLoads | None
@@ -71,7 +73,7 @@ def report(found: Findings) -> str:
     )
     if solution.message:
         lines.append(f"  {solution.message}")
-    if found.clearance.touching:
+    if found.through:
         near = found.clearance.in_words()
         lines.append(f"  {near}, of which this equilibrium knows nothing; with --disks it does")
     return "\n".join(lines)
