@@ -20,6 +20,9 @@ from ccr_ros.model.rotation import Pose
 
 from .conversions import pose_message, pulls_from_message
 
+#: what the solver answers while it plans something else
+BUSY = "refused: another plan is being made"
+
 # The solver's side
 
 

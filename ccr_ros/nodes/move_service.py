@@ -15,7 +15,7 @@ from ccr_ros.grasp.manipulation import MovePlan, Waypoint, move_steps
 from ccr_ros.model import CcrError, InvalidValue
 
 from .grasp_channel import GraspChannel
-from .move_conversions import fill_plan, limits_from_request, target_from_request
+from .move_conversions import BUSY, fill_plan, limits_from_request, target_from_request
 from .turns import take_turn
 
 Steps = Generator[Waypoint | None, str | None, MovePlan]
@@ -79,7 +79,7 @@ class MoveService:
         self, request: PlanMove.Request, response: PlanMove.Response
     ) -> PlanMove.Response:
         if self._asked is not None:
-            response.message = "refused: another plan is being made"
+            response.message = BUSY
             return response
         answer: Future = Future()
         self._asked = request, answer
