@@ -3,7 +3,10 @@
 
 from __future__ import annotations
 
+from ccr_ros.model import checks
 from ccr_ros.model.errors import InvalidValue
+
+_LONGEST = 50  # characters of a name to which others are added
 
 
 def number(option: str, text: str, low: float, high: float) -> float:
@@ -34,3 +37,15 @@ def integer(option: str, text: str, low: int, high: int) -> int:
     if not low <= value <= high:
         raise InvalidValue(option, text, f"an integer {low}..{high}")
     return value
+
+
+def file_name(option: str, text: str) -> str:
+    """Return a name that a gripper and its files may have.
+
+    Raises:
+        InvalidValue: It may be none, or leads out of the folder; the error names the option.
+    """
+    if len(text) > _LONGEST or text.startswith(".") or set(text) & set("/\\"):
+        allowed = f"a name of at most {_LONGEST} characters, no '/' or '\\' and no '.' at its start"
+        raise InvalidValue(option, text, allowed)
+    return checks.label(option, text)

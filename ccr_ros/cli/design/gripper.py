@@ -27,7 +27,7 @@ from typing import Any
 
 import numpy as np
 
-from ccr_ros.cli.options import integer, number
+from ccr_ros.cli.options import file_name, integer, number
 from ccr_ros.cli.solve import parse_pull
 from ccr_ros.design.curve_text import object_from_text
 from ccr_ros.design.gripper import GripperDesign, GripperTask, NoRestShape, design_gripper
@@ -113,6 +113,8 @@ def run(args: argparse.Namespace) -> int:
         if path:
             made = Path(path).parent == Path(args.out)  # that folder may not be there yet
             checked_path(Path(path).name if made else path)
+    if args.name is not None:
+        file_name("--name", args.name)
     options = options_from_args(args)
     task = _task(args)
     kind = task.layout.body.kind

@@ -31,7 +31,7 @@ from pathlib import Path
 from typing import Any
 
 from ccr_ros.cli.grasp_arguments import add_body_arguments, body_from_args, gravity_from_args
-from ccr_ros.cli.options import integer, number
+from ccr_ros.cli.options import file_name, integer, number
 from ccr_ros.design.gripper_files import write_gripper
 from ccr_ros.design.turn import TurnResult, TurnTask, evaluate_turn, record_turn, scaled
 from ccr_ros.design.turn_search import TurnDesign, TurnSearch, search_turn
@@ -89,19 +89,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Evaluate, search if asked to, write, draw and print; return the exit code."""
-    if args.plot:
+    if args.plot is not None:
         checked_path(args.plot)
-    if args.output and args.tries is None:
+    if args.output is not None and args.tries is None:
         raise InvalidValue("--output", args.output, "given with --try, which finds what to write")
     gripper = load_gripper(find_config(args.gripper))
     angle = math.radians(number("--angle", args.angle, 0.1, 90))
     task = _task(args, gripper)
+    name = gripper.name if args.name is None else file_name("--name", args.name)
+    folder = None if args.output is None else output_folder(args.output)  # not after hours
     settings = SolverSettings(time_limit=_TIME_LIMIT)
     search = None
     if args.tries is not None:
         search = _searched(args, gripper, task, settings)
         gripper, task = search.best.gripper, scaled(task, search.best.choice.force)
-        gripper = replace(gripper, name=args.name or gripper.name)
+        gripper = replace(gripper, name=name)
     result = evaluate_turn(gripper.fingers, task, settings)
     loads = payload_until_slip(result.solver) if args.until_slip and result.held else None
     if args.json:
@@ -111,7 +113,7 @@ def run(args: argparse.Namespace) -> int:
         print(json.dumps(found))
     else:
         print(report(gripper, task, result, angle, loads))
-    _leave(args, gripper, result, summary(task, result), search)
+    _leave(args, gripper, result, summary(task, result), folder)
     return 0 if result.reached(angle) else 1
 
 
@@ -180,18 +182,18 @@ def _leave(
     gripper: Gripper,
     result: TurnResult,
     text: str,
-    search: TurnSearch | None,
+    folder: Path | None,
 ) -> None:
     """Write and draw what was asked for, and say so."""
     left: list[Path | str] = []
-    if args.output and search is not None:
+    if folder is not None:
         comment = f"{text}\nMade by: ccr design turn {_command(args)}"
         kinds = kinds_of(gripper)
         left += write_gripper(
-            gripper, kinds, output_folder(args.output), f"{gripper.name}_finger", comment,
+            gripper, kinds, folder, f"{gripper.name}_finger", comment,
             [comment] * (max(kinds) + 1),
         )  # fmt: skip
-    if args.plot and result.ways:
+    if args.plot is not None and result.ways:
         from ccr_ros.viz.turn_plot import plot_turn
 
         left.append(plot_turn(args.plot, gripper.name, record_turn(result), result))
