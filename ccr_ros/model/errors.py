@@ -105,14 +105,15 @@ class NotConverged(CcrError):
     """A converged pose was demanded, and the solve did not converge.
 
     Attributes:
-        finger: Name of the finger.
+        finger: Name of the finger; "grasp" for fingers and object together.
         reason: Why, and what to do.
     """
 
     def __init__(self, finger: str, reason: str) -> None:
         self.finger = finger
         self.reason = reason
-        super().__init__(f"finger {finger!r}: no converged pose: {reason}")
+        who = finger if finger == "grasp" else f"finger {finger!r}"
+        super().__init__(f"{who}: no converged pose: {reason}")
 
 
 class MissingPackage(CcrError):

@@ -144,8 +144,8 @@ def _object(item: Object, known: Sequence[SceneObject]) -> SceneObject:
     if shape is None:
         try:
             shape = obstacle_from_body(replace(solid, pose=Pose()))
-        except InvalidValue as error:  # what is not known of a mesh until now
-            raise error.located("mesh") from None
+        except InvalidValue as error:  # what is not known of it until now
+            raise error.located("primitive" if solid.vertices is None else "mesh") from None
     return SceneObject(solid, shape, float(item.mass), float(item.friction), bool(item.held))
 
 

@@ -37,6 +37,10 @@ def test_texts():
     ]
 
 
+def test_fingers_and_object_together_are_no_finger():
+    assert str(NotConverged("grasp", "it falls")) == "grasp: no converged pose: it falls"
+
+
 def test_families():
     assert isinstance(ERRORS[0], ValueError) and isinstance(ERRORS[1], InvalidValue)
     assert isinstance(ERRORS[4], LookupError)

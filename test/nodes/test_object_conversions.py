@@ -119,6 +119,11 @@ def test_a_mesh_of_triangles_is_taken_as_it_is():
             objects_from_message(objects(cube(faces, points)), "base")
 
 
+def test_a_size_that_cannot_be_is_the_primitives():
+    with pytest.raises(InvalidValue, match=r"objects\[0\]\.primitive\.radius"):
+        objects_from_message(objects(sphere("ball", 1e9, (0.0, 0.0, 0.1))), "base")
+
+
 def test_dimensions_count_more_than_a_mesh():
     item = cube()
     item.primitive = SolidPrimitive(type=SolidPrimitive.SPHERE, dimensions=[0.01])
