@@ -44,7 +44,8 @@ def test_grasp_hold_and_timed_release(stack):
     assert (result.released, result.state, result.message) == (True, "ready", "released")
     remaining = [message.remaining for message in goal.feedback]
     assert remaining[0] > 0.5 and remaining[-1] == 0.0
-    assert forces(result) == [0.0, 0.0, 0.0]
+    # The solver may be behind the servos.
+    stack.probe.until(lambda: forces(stack.now) == [0.0, 0.0, 0.0], "no force any more")
     assert all(abs(finger.pulls_measured[0] - OPEN) < 3e-4 for finger in result.fingers)
 
 
