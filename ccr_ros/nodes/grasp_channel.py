@@ -291,7 +291,7 @@ class GraspChannel:
         newest = max((channel.accepted for channel in self._fingers), key=_arrival)
         fault, stale = self.fault, self._stale
         name = None if self._object is None else self._object.name
-        told = (newest.arrived if self.active else 0.0, fault, stale, name)
+        told = (newest.arrived, fault, stale, name)
         if told == self._told:
             return
         self._told = told

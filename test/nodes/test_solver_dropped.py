@@ -32,13 +32,14 @@ def test_fingers_go_on_by_themselves(hand, probe):
     assert not fallen.held and fallen.stale and not fallen.contacts
     assert (fallen.object, fallen.pose) == ("ball", held.pose)
     assert "dropped" in hand.status(": grasp", DiagnosticStatus.WARN).message
-    # They close where it was, each by itself, and nothing more is said of the object.
+    # They close where it was, each by itself, and of the object the same is said.
     told = len(hand.states)
     state = probe.pull_and_wait("finger_1", [TIGHT])
     assert not state.contacts and not state.stale
     assert probe.states("finger_2")[-1].pulls[0] == 0.0
     probe.publish("objects", objects(ball(held=True)))  # as somebody says who has not seen it
     assert not probe.pull_and_wait("finger_1", [SHUT]).contacts
+    hand.probe.until(lambda: len(hand.states) > told, "the state again, with the pulls")
     assert all(s.message == fallen.message for s in hand.states[told:])
     # Put back it stands, and can be held again.
     probe.pull_and_wait("finger_1", [0.0])
