@@ -76,6 +76,23 @@ def test_people_read_contacts_measures_and_loads(ccr):
     assert "-0.000" not in out and "NOT HELD" not in out
 
 
+@pytest.mark.long
+def test_the_steps_in_which_fingers_close_are_small_enough(ccr):
+    """What touches within a step slides freely in it: in large steps the ball is elsewhere."""
+    words = (*DOWN[:-4], "--points", "sideways", "--pull", "3.2%")
+    code, out, _ = ccr(*words, "--json")
+    found = strict_json(out)
+    fingers = load_gripper(find_config("gripper_sphere")).fingers
+    ball = sphere_body(0.112, 0.02, Pose(np.array([0, 0, 0.110])), 0.5)
+    solver = GraspSolver(fingers, ball, gravity=np.array([-9.80665, 0, 0]), friction_step=4e-4)
+    solver.solve({name: list(pulls.values()) for name, pulls in found["pulls"].items()})
+    fine = solver.let_go().require_converged().body.pose.position
+    assert code == 0
+    np.testing.assert_allclose(found["object"]["position"], fine, atol=5e-6)
+    code, out, _ = ccr(*words)
+    assert "friction margin 0.000" in out
+
+
 def test_what_falls_is_not_held(ccr):
     words = (*BALL, "--mass", "0.2", "--pull", "3.2%", "--points", "down")
     code, out, _ = ccr(*words, "--json")

@@ -87,8 +87,9 @@ def _measures(found: Findings, unit: str) -> list[str]:
             closed = f"epsilon {q.epsilon:.3g}..{q.epsilon_upper:.3g}, weakest against"
         else:
             closed = "no force closure: nothing balances"
+        margin = "none" if math.isnan(q.margin) else f"{round(q.margin, 3) + 0.0:.3f}"  # no -0.000
         lines += [
-            f"  friction margin {'none' if math.isnan(q.margin) else format(q.margin, '.3f')}",
+            f"  friction margin {margin}",
             f"  {closed} {q.weakest_in_words}",
             f"  normal forces no larger than now could carry {q.payload:.4g} {unit}, spread best",
         ]
