@@ -99,7 +99,7 @@ def test_what_arrives_is_counted():
     m = Measurements(["a", "b"])
     m.add_state("a", 5 * MS, 6 * MS, solve_time=9.0)  # the rest pose, before any pulls
     assert m.unanswered == ["a", "b"]
-    for k in range(5):  # heard, but never answered
+    for k in range(3):  # newer ones come first
         m.add_pulls("a", (100 + k) * MS)
     for k in range(10):
         stamp = (110 + 20 * k) * MS
@@ -109,8 +109,10 @@ def test_what_arrives_is_counted():
         touching = {"ball"} if k in (2, 3, 6) else set()
         force = 0.1 * k if touching else 0.0
         m.add_state("a", stamp, stamp + 2 * MS, solve_time=1e-3, touching=touching, force=force)
-        m.add_state("b", stamp, stamp + 4 * MS, solve_time=3e-3, superseded=3, stable=k != 5)
+        m.add_state("b", stamp, stamp + 4 * MS, solve_time=3e-3, stable=k != 5)
     assert m.caught_up and m.unanswered == []
+    for k in range(2):  # heard, but never answered
+        m.add_pulls("b", (400 + k) * MS)
     m.add_state("a", 290 * MS, 999 * MS, solve_time=1.0, stale=True)  # the same pose once more
     m.markers = 7
     report = m.report()
@@ -130,6 +132,16 @@ def test_what_arrives_is_counted():
         "7 messages",
     ):
         assert words in text
+
+
+def test_pulls_heard_after_their_pose_are_answered():
+    m = Measurements(["a"])
+    m.add_pulls("a", 1 * MS)
+    for k in (3, 5):
+        m.add_state("a", k * MS, k * MS + 9, solve_time=1e-3)
+        m.add_pulls("a", k * MS)
+    report = m.report()
+    assert (report.pulls, report.poses, report.superseded, report.lost) == (3, 2, 1, 0)
 
 
 def test_a_single_pose_has_no_rate():

@@ -18,6 +18,7 @@ class _FingerCount:
     arrivals: list[int] = field(default_factory=list)  # [ns]
     latencies: list[int] = field(default_factory=list)  # [ns]
     solve_times: list[float] = field(default_factory=list)  # [s]
+    waiting: list[int] = field(default_factory=list)  # stamps of pulls that await a pose [ns]
     superseded: int = 0
     stale: int = 0
     unstable: int = 0
@@ -40,6 +41,8 @@ class Measurements:
         """Note pulls that were published at ``stamp`` [ns]."""
         count = self._fingers[finger]
         count.pulls += 1
+        if stamp > count.newest:  # else its pose was heard before it
+            count.waiting.append(stamp)
         if count.first_pulls is None:
             count.first_pulls = stamp
         count.last_pulls = max(count.last_pulls, stamp)
@@ -53,7 +56,6 @@ class Measurements:
         solve_time: float,
         stable: bool = True,
         stale: bool = False,
-        superseded: int = 0,
         touching: Collection[str] = (),
         force: float = 0.0,
     ) -> None:
@@ -66,7 +68,6 @@ class Measurements:
             solve_time: Of this pose [s].
             stable: What its certificate says.
             stale: Whether it is an old pose, sent again because newer pulls could not be solved.
-            superseded: Pull messages that were never solved as a newer one came, since the start.
             touching: Names of the obstacles the finger touches.
             force: Largest contact force.
         """
@@ -78,7 +79,8 @@ class Measurements:
         count.arrivals.append(arrival)
         count.latencies.append(arrival - stamp)
         count.solve_times.append(solve_time)
-        count.superseded = superseded
+        count.superseded += sum(pulls < stamp for pulls in count.waiting)
+        count.waiting = [pulls for pulls in count.waiting if pulls > stamp]
         count.unstable += not stable
         count.contacts += len(set(touching) - count.touching)
         count.touching = frozenset(touching)
@@ -125,7 +127,7 @@ class Report:
     Attributes:
         pulls: Messages of measured pulls that were heard, all fingers together.
         poses: Poses that arrived, each the answer to one of these.
-        superseded: Pulls that were not solved as a newer message came first.
+        superseded: Pulls that were not solved as newer ones, or the same again, came first.
         rate: Poses per second of a finger [Hz].
         latency: Median and 99th percentile from pulls published to pose received [s].
         solve_time: Median and 99th percentile of the solves behind these poses [s].
@@ -150,7 +152,7 @@ class Report:
 
     @property
     def lost(self) -> int:
-        """Pulls that no pose answered and that were not superseded in the solver node."""
+        """Pulls that no pose answered, neither theirs nor that of newer ones."""
         return max(0, self.pulls - self.poses - self.superseded)
 
     def lines(self, force_unit: str) -> list[str]:

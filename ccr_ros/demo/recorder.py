@@ -195,7 +195,6 @@ class Recorder(Node):
             solve_time=message.certificate.solve_time,
             stable=message.certificate.stable,
             stale=message.stale,
-            superseded=message.dropped,
             touching={contact.obstacle for contact in message.contacts},
             force=max((contact.force for contact in message.contacts), default=0.0),
         )
