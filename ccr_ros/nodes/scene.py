@@ -61,6 +61,7 @@ class ObjectScene:
 
     def _put(self, objects: Sequence[SceneObject]) -> bool:
         in_hand = None if self._grasp is None else self._grasp.choose(objects)
+        self._check_weight(in_hand)
         before = [o for o in self.objects if o is not self._in_hand]
         others = [o for o in objects if o is not in_hand]
         changed = [o.key for o in others] != [o.key for o in before]
@@ -77,6 +78,12 @@ class ObjectScene:
                 raise
         self._in_hand = in_hand
         return changed or due
+
+    def _check_weight(self, in_hand: SceneObject | None) -> None:
+        per_ei = [f.finger.name for f in self._fingers if f.finger.forces_are != "newton"]
+        if in_hand is not None and in_hand.mass > 0 and per_ei:
+            allowed = f"0: forces are per EI, as {per_ei[0]} has no youngs_modulus"
+            raise InvalidValue(f"objects.{in_hand.name}.mass", in_hand.mass, allowed)
 
     def _give(self, objects: Sequence[SceneObject]) -> None:
         before = [finger.solver.obstacles for finger in self._fingers]

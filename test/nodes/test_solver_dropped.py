@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Mode gripper after the fingers have let an object fall that was said to be held."""
+"""Mode gripper after a held object has fallen, or got a weight that it cannot have."""
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 from probe import objects, sphere
 from test_solver_gripper import FINGERS, SHUT, TIGHT, Hand, ball
+
+from ccr_ros.resources import config_dir
 
 
 @pytest.fixture
@@ -62,3 +64,17 @@ def test_what_came_meanwhile_is_in_the_way_once_it_stands_again(hand, probe):
     hand.say(ball(height=0.106), bead)
     closed = hand.finger("finger_1", hand.pull(TIGHT).header.stamp)
     assert {c.obstacle for c in closed.contacts} == {"ball", "bead"}
+
+
+def test_a_weight_that_comes_later_is_refused_where_forces_are_per_ei(probe, start, tmp_path):
+    for name in ("gripper_sphere.yaml", "sphere_finger.yaml"):
+        lines = (config_dir() / name).read_text(encoding="utf-8").splitlines(keepends=True)
+        text = "".join(line for line in lines if "youngs_modulus" not in line)
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    path = str(tmp_path / "gripper_sphere.yaml")
+    hand = Hand(probe, start, gripper_file=path, object="ball")
+    hand.say(ball(mass=0.0))
+    hand.pull(SHUT)
+    assert hand.say(ball(mass=0.0, held=True)).held
+    assert "objects.ball.mass" in hand.refused(ball(mass=0.02, held=True))
+    assert hand.pull(TIGHT).held  # and all goes on
