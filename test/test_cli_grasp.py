@@ -2,6 +2,7 @@
 """`ccr grasp`, as typed by a person and as read by a program."""
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -107,11 +108,13 @@ def test_fingers_that_pass_through_each_other_hold_nothing(ccr):
     words = (*BALL, "--mass", "0.02", "--pull", "0.1")
     code, out, _ = ccr(*words)
     assert code == 1 and "NOT HELD" in out
-    assert "disk 3 of finger_1 and disk 3 of finger_2 meet" in out
+    # which two of three alike is for rounding to say
+    assert re.search(r"disk 3 of finger_\d and disk 3 of finger_\d meet", out)
     code, out, _ = ccr(*words, "--json")
     found = strict_json(out)
     assert found["converged"] and found["stable"] and not found["held"]
-    assert found["clearance"] == {"gap": 0, "fingers": ["finger_1", "finger_2"], "disks": [3, 3]}
+    assert (found["clearance"]["gap"], found["clearance"]["disks"]) == (0, [3, 3])
+    assert len(set(found["clearance"]["fingers"])) == 2
 
 
 def test_pulls_are_of_all_fingers_of_a_cable_or_of_one():

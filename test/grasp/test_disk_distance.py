@@ -89,6 +89,15 @@ def test_disks_through_each_other_say_how_far_and_push_apart():
     assert np.abs(second_derivatives(one, other, found)).max() == 0.0
 
 
+@pytest.mark.parametrize("way", [0.0, 4.5e-277, 1e-150, 1e-13])
+def test_disks_in_one_place_cut_each_other(way):
+    one, other = pair([0.0, way, 0.0], FLAT)
+    found = nearest(one, other)
+    assert found.cut[0] and np.linalg.norm(found.normals[0]) == pytest.approx(1.0)
+    assert -4 * E < found.gaps[0] < 0.0
+    assert gaps_at_least(one, other)[0] <= found.gaps[0]
+
+
 @settings(max_examples=40, **STEADY)
 @given(center=places, frame=turns, other_frame=turns, radius=radii)
 def test_gaps_against_projections_and_bounds(center, frame, other_frame, radius):

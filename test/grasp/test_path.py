@@ -52,7 +52,7 @@ def test_that_there_is_no_equilibrium_is_found_in_few_steps(case):
 
 def test_a_point_that_has_only_touched_slips_on_at_the_next_pull():
     """To stick it would have to be pulled on to the surface; it slips, which one step finds."""
-    solver = GraspSolver(around(2, 0.03), cube(0.5, 0.002), LONG)
+    solver = GraspSolver(around(2, 0.03), cube(0.5, 0.002), LONG, friction_step=0.0025)
     solver.solve({"finger_1": [0.0004], "finger_2": [0.0004]}).require_converged()
     touching = solver.solve({"finger_1": [0.0002]}).require_converged()
     assert touching.margin == pytest.approx(1.0)  # no friction yet

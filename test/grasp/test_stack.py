@@ -26,6 +26,11 @@ def hand_of(*made, radius=0.03):
     return mounted
 
 
+def with_two_cables(mounted):
+    cables = [Cable("a", np.zeros(7)), Cable("b", np.full(7, np.pi / 2))]
+    return replace(mounted, finger=replace(mounted.finger, cables=cables))
+
+
 def leaves(thing):
     if isinstance(thing, np.ndarray | float):
         return [thing]
@@ -59,9 +64,12 @@ def test_derivatives_are_those_of_each_finger_alone(walls):
     guesses = [guess(p, 1 + len(p.finger.obstacles), rng) for p in together.problems]
     parts = derive(together, body, body.pose, guesses)
     for part, one, own in zip(parts, mounted, guesses, strict=True):
-        alone = Hand([mounted[0], one])  # whose units are those of the first
-        first = Guess(guesses[0].y, guesses[0].tensions, guesses[0].forces)
-        (_, wanted) = derive(alone, body, body.pose, [first, own])
+        k = mounted.index(one)
+        others = [with_two_cables(m) for m in mounted]  # as long, so that units are the same
+        alone = Hand([*others[:k], one, *others[k + 1 :]])
+        assert (k,) in alone.alike
+        rest = [guess(p, 1 + len(p.finger.obstacles), rng) for p in alone.problems]
+        wanted = derive(alone, body, body.pose, [*rest[:k], own, *rest[k + 1 :]])[k]
         assert len(wanted.friction) > 0 or not len(part.friction)
         for a, b in zip(leaves(part), leaves(wanted), strict=True):
             np.testing.assert_allclose(a, b, atol=1e-11)

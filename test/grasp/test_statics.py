@@ -9,7 +9,7 @@ import pytest
 from ccr_ros.grasp.statics import Body, GraspSolver, sphere_body
 from ccr_ros.grasp.statics.assembly import derive, gather
 from ccr_ros.grasp.statics.meeting import Guess
-from ccr_ros.grasp.statics.path import displaced
+from ccr_ros.grasp.statics.path import displaced, turn_between
 from ccr_ros.model import (
     Box,
     InvalidValue,
@@ -137,6 +137,24 @@ def test_heavier_is_lower_and_a_new_mass_is_kept(fingers):
     assert np.abs(force).max() < 1e-6
 
 
+@pytest.mark.parametrize("friction", [0.0, 0.5])
+def test_the_order_of_unlike_fingers_changes_nothing(fingers, friction):
+    stiff = replace(fingers[1].finger, backbone_diameter=0.0029)
+    short = replace(fingers[2].finger, length=0.175)
+    unlike = [fingers[0], replace(fingers[1], finger=stiff), replace(fingers[2], finger=short)]
+    ball = sphere_body(0.112, 0.02, UP, friction)
+    found = []
+    for order in (unlike, unlike[::-1]):
+        solver = GraspSolver(order, ball)
+        solver.solve({name: [0.006] for name in solver.names}).require_converged()
+        found.append(solver.let_go().require_converged())
+    one, two = found
+    assert np.allclose(one.body.pose.position, two.body.pose.position, atol=1e-9)
+    assert [(c.finger, c.disk) for c in one.contacts] == [(c.finger, c.disk) for c in two.contacts]
+    assert np.allclose([c.force for c in one.contacts], [c.force for c in two.contacts], atol=1e-8)
+    assert one.smallest_eigenvalue == pytest.approx(two.smallest_eigenvalue, rel=1e-6)
+
+
 def test_a_rigid_motion_of_all_changes_nothing(fingers):
     turn = Pose(np.array([0.3, -0.2, 0.5]), np.array([0.5, -0.5, 0.5, 0.5]))
     moved = [MountedFinger(m.finger, turn @ m.base) for m in fingers]
@@ -230,3 +248,14 @@ def test_bad_values_are_named(fingers):
         solver.solve({}, force=[0.0, float("nan"), 0.0])
     with pytest.raises(InvalidValue, match="overlaps the disk by"):
         GraspSolver(fingers, sphere_body(0.112, 0.02)).solve({})
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-12, 1e-3, 2.0, np.pi - 1e-9, np.pi])
+def test_a_turn_is_what_leads_from_one_orientation_to_the_other(angle):
+    axis = np.array([2.0, -1.0, 2.0]) / 3
+    start = Pose(orientation=np.array([0.5, -0.5, 0.5, 0.5]))
+    end = displaced(start, np.concatenate([np.zeros(3), angle * axis]), 1.0)
+    turn = turn_between(start, end)
+    assert np.linalg.norm(turn) == pytest.approx(angle, abs=1e-14)
+    assert abs(turn @ axis) == pytest.approx(angle, abs=1e-14)
+    assert np.allclose(displaced(start, np.append(np.zeros(3), turn), 1.0).rotation, end.rotation)

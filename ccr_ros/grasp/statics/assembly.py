@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """One problem of several fingers and the object between them.
 
-In units of the first finger's length L and of EI / L, with y_f the fingers' coordinates
+In units of the fingers' mean length L and mean EI / L, with y_f the fingers' coordinates
 (`ccr_ros.model.equilibrium`) and q = (translation, rotation vector) a small motion of the object
 from where it is:
 
@@ -49,8 +49,8 @@ class Hand:
     Attributes:
         mounted: The fingers with their bases.
         problems: One per finger.
-        weights: (F,) EI / L of each finger relative to the first one's.
-        energy: EI / L of the first finger [J]; length: its length [m]: the units.
+        weights: (F,) EI / L of each finger relative to their mean.
+        energy: Mean EI / L of the fingers [J]; length: their mean length [m]: the units.
         alike: Indices of fingers that are evaluated at once; stacks: what does it.
     """
 
@@ -59,9 +59,12 @@ class Hand:
     ) -> None:
         self.mounted = tuple(fingers)
         self.problems = [EquilibriumProblem(m.finger, settings) for m in fingers]
-        first = self.mounted[0].finger
-        self.length = first.length
-        self.energy = first.bending_stiffness / first.length
+        lengths = np.array([m.finger.length for m in fingers])
+        energies = np.array([m.finger.bending_stiffness for m in fingers]) / lengths
+        # Of all fingers alike: in whose units a support fades decides where the object comes to
+        # rest, which must not hang on which finger is named first.
+        self.length = float(lengths.mean())
+        self.energy = float(energies.mean())
         self.weights = np.array(
             [m.finger.bending_stiffness / m.finger.length / self.energy for m in fingers]
         )

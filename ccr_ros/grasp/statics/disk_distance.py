@@ -33,6 +33,7 @@ _STEPS = 60
 _EASY = 3  # steps that mostly are enough; then shorter ones are tried, too
 _SHARES = (1.0, 0.25, 0.06, 0.015)  # of Newton's steps
 _EXACT = 1e-11  # of the cores' radii: change of the nearest points at which they are found
+_NOWHERE = 1e-12  # of the units; centres that are nearer are in one place
 _CUT = 1e-4  # of the cores' radii; cores that are nearer cut each other
 
 
@@ -92,7 +93,7 @@ def gaps_at_least(one: Disks, other: Disks) -> np.ndarray:
     """Return lower bounds (k,) of the gaps, at little cost: along the line of the centres."""
     way = other.centers - one.centers
     far = np.sqrt(np.einsum("ij,ij->i", way, way))
-    way = way / np.maximum(far, 1e-300)[:, None]
+    way = way / np.maximum(far, _NOWHERE)[:, None]
     bound = far - one.edges - other.edges - 0.5 * DOME * (one.cores + other.cores)
     for disks in (one, other):
         along = np.einsum("ij,ij->i", way, disks.frames[:, :, 2])
@@ -279,7 +280,10 @@ class _Task:
     ) -> None:
         """Put in for pairs that cut each other how far they are past each other (see `Nearest`)."""
         line = self.offset[cut]
-        line = line / np.maximum(np.linalg.norm(line, axis=1), 1e-300)[:, None]
+        far = np.linalg.norm(line, axis=1)[:, None]
+        line = np.where(
+            far > _NOWHERE, line / np.maximum(far, _NOWHERE), self.one.frames[cut, :, 2]
+        )
         for disks, points, sign, own in (
             (self.one, a, 1.0, slice(0, 2)),
             (self.other, b, -1.0, slice(2, 4)),

@@ -374,11 +374,13 @@ def displaced(pose: Pose, motion: np.ndarray, length: float) -> Pose:
 
 
 def turn_between(start: Pose, end: Pose) -> np.ndarray:
-    """Return the rotation vector (3,) from one orientation to another, in their common frame."""
-    turn = end.rotation @ start.rotation.T
-    axis = 0.5 * np.array(
-        [turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]]
-    )
-    sine, cosine = float(np.linalg.norm(axis)), 0.5 * (float(np.trace(turn)) - 1.0)
-    angle = float(np.arctan2(sine, cosine))
-    return axis * (angle / sine) if sine > 1e-12 else axis
+    """Return the rotation vector (3,) from one orientation to another, in their common frame.
+
+    The shorter way; of half a turn, either.
+    """
+    back = start.orientation * np.array([-1.0, -1.0, -1.0, 1.0])
+    turn = quaternion_product(end.orientation, back)
+    turn = turn if turn[3] >= 0 else -turn
+    half = float(np.linalg.norm(turn[:3]))
+    angle = 2.0 * float(np.arctan2(half, turn[3]))
+    return turn[:3] * (angle / half if half > 0.0 else 2.0)

@@ -164,7 +164,7 @@ class GraspSolution:
     def smallest_eigenvalue(self) -> float:
         """Of the Hessian reduced to what the constraints leave free.
 
-        Relative to a free finger's stiffness; lengths in units of the first finger's. Takes as long
+        Relative to a free finger's stiffness; lengths in units of the fingers' mean. Takes as long
         as a solve; whether it is above some value `Stability.exceeds` tells at once.
         """
         return self.stability.smallest_eigenvalue

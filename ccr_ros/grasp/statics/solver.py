@@ -72,7 +72,7 @@ class GraspSolver:
         body: Body,
         settings: SolverSettings | None = None,
         gravity: np.ndarray = GRAVITY,
-        friction_step: float = 0.0025,
+        friction_step: float = 0.00125,
         disks: DiskShape | None = None,
     ) -> None:
         if not fingers:
@@ -175,7 +175,7 @@ class GraspSolver:
         """
         begin = time.perf_counter()
         if self._point is None:
-            raise InvalidValue("let_go", None, "called after a solve")
+            raise InvalidValue("let_go", None, "called after a solve that converged")
         way = self._way()
         if self.supported:
             load = self._point.load
