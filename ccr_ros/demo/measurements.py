@@ -19,7 +19,6 @@ class _FingerCount:
     latencies: list[int] = field(default_factory=list)  # [ns]
     solve_times: list[float] = field(default_factory=list)  # [s]
     waiting: list[int] = field(default_factory=list)  # stamps of pulls that await a pose [ns]
-    superseded: int = 0
     stale: int = 0
     unstable: int = 0
     touching: frozenset[str] = frozenset()
@@ -79,7 +78,6 @@ class Measurements:
         count.arrivals.append(arrival)
         count.latencies.append(arrival - stamp)
         count.solve_times.append(solve_time)
-        count.superseded += sum(pulls < stamp for pulls in count.waiting)
         count.waiting = [pulls for pulls in count.waiting if pulls > stamp]
         count.unstable += not stable
         count.contacts += len(set(touching) - count.touching)
@@ -108,7 +106,7 @@ class Measurements:
         return Report(
             pulls=sum(c.pulls for c in self._fingers.values()),
             poses=sum(len(c.arrivals) for c in counts),
-            superseded=sum(c.superseded for c in counts),
+            lost=sum(len(c.waiting) for c in self._fingers.values()),
             rate=float(np.mean([n / span if span > 0 else 0.0 for n, span in spans])),
             latency=(_percentile(latencies, 50), _percentile(latencies, 99)),
             solve_time=(_percentile(solve_times, 50), _percentile(solve_times, 99)),
@@ -127,7 +125,7 @@ class Report:
     Attributes:
         pulls: Messages of measured pulls that were heard, all fingers together.
         poses: Poses that arrived, each the answer to one of these.
-        superseded: Pulls that were not solved as newer ones, or the same again, came first.
+        lost: Pulls that no pose answered, neither theirs nor that of newer ones.
         rate: Poses per second of a finger [Hz].
         latency: Median and 99th percentile from pulls published to pose received [s].
         solve_time: Median and 99th percentile of the solves behind these poses [s].
@@ -140,7 +138,7 @@ class Report:
 
     pulls: int
     poses: int
-    superseded: int
+    lost: int
     rate: float
     latency: tuple[float, float]
     solve_time: tuple[float, float]
@@ -151,9 +149,9 @@ class Report:
     markers: int
 
     @property
-    def lost(self) -> int:
-        """Pulls that no pose answered, neither theirs nor that of newer ones."""
-        return max(0, self.pulls - self.poses - self.superseded)
+    def superseded(self) -> int:
+        """Pulls that were not solved as newer ones, or the same again, came first."""
+        return max(0, self.pulls - self.poses - self.lost)
 
     def lines(self, force_unit: str) -> list[str]:
         """Return the report as lines for people."""
