@@ -12,6 +12,22 @@ from collections.abc import Callable, Generator
 from typing import Any
 
 
+class _Unretrieved:
+    """An exception that nobody has asked for yet: told when it goes.
+
+    Futures themselves have no ``__del__``. They go all the time, and Python would swallow, with a
+    traceback, the KeyboardInterrupt of a signal that comes while it calls that.
+    """
+
+    def __init__(self, exception: BaseException) -> None:
+        self.exception = exception
+        self.fetched = False
+
+    def __del__(self) -> None:
+        if not self.fetched:
+            print(f"The following exception was never retrieved: {self.exception}", file=sys.stderr)
+
+
 class Future:
     """A result to come.
 
@@ -22,18 +38,11 @@ class Future:
         self._done = False
         self._cancelled = False
         self._result: Any = None
-        self._exception: BaseException | None = None
-        self._exception_fetched = False
+        self._raised: _Unretrieved | None = None
         self._callbacks: list[Callable[[Future], Any]] = []
         self._lock = threading.Lock()
         self._executor: weakref.ref[Any] | None = None
         self._set_executor(executor)
-
-    def __del__(self) -> None:
-        if getattr(self, "_exception", None) is not None and not self._exception_fetched:
-            print(
-                f"The following exception was never retrieved: {self._exception}", file=sys.stderr
-            )
 
     def __await__(self) -> Generator[None, None, Any]:
         while not self._done:
@@ -57,15 +66,17 @@ class Future:
 
     def result(self) -> Any:
         """The result (None before it is done), or the exception raised."""
-        if self._exception is not None:
-            self._exception_fetched = True
-            raise self._exception
+        exception = self.exception()
+        if exception is not None:
+            raise exception
         return self._result
 
     def exception(self) -> BaseException | None:
         """The exception, if that is how it ended."""
-        self._exception_fetched = True
-        return self._exception
+        if self._raised is None:
+            return None
+        self._raised.fetched = True
+        return self._raised.exception
 
     def set_result(self, result: Any) -> None:
         """Finish with a result."""
@@ -78,8 +89,7 @@ class Future:
     def set_exception(self, exception: BaseException) -> None:
         """Finish with an exception."""
         with self._lock:
-            self._exception = exception
-            self._exception_fetched = False
+            self._raised = _Unretrieved(exception)
             self._done = True
             self._cancelled = False
         self._schedule_or_invoke_done_callbacks()

@@ -49,7 +49,7 @@ def end(process: subprocess.Popen, how: int) -> int:
     """End a node by a signal; return its exit code."""
     process.send_signal(how)
     _, errors = process.communicate(timeout=WAIT)
-    assert "Traceback" not in errors
+    assert "Traceback" not in errors, errors
     return process.returncode
 
 
