@@ -95,9 +95,15 @@ def draw_surface(axes: Any, surface: Surface, label: str = "") -> None:
         if normal @ (face.mean(axis=0) - center) < 0:
             normal = -normal
         colors.append((*np.clip(base * (0.85 + 0.35 * (normal @ light)), 0, 1), 0.22))
+    # As many corners for each, the last one repeated: for shorter ones Matplotlib (3.11) keeps
+    # corners that it has not set, and takes the axes' limits of them, too.
+    most = max(len(face) for face in faces)
+    alike = [
+        np.concatenate([face, np.repeat(face[-1:], most - len(face), axis=0)]) for face in faces
+    ]
     axes.add_collection3d(
         Poly3DCollection(
-            faces, facecolors=colors, edgecolors=[(*base, 0.10)], linewidths=0.3, label=label
+            alike, facecolors=colors, edgecolors=[(*base, 0.10)], linewidths=0.3, label=label
         )
     )
 

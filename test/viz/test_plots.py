@@ -214,3 +214,20 @@ def test_a_body_is_drawn_where_its_pose_says() -> None:
     rod = surface(SolidObject("rod", "cylinder", (0.2, 0.01), turned)).vertices
     np.testing.assert_allclose([rod[:, 0].min(), rod[:, 0].max()], [0.0, 0.2], atol=1e-12)
     np.testing.assert_allclose(np.abs(rod[:, 2]).max(), 0.01, atol=1e-12)
+
+
+def test_faces_have_as_many_corners_each(monkeypatch) -> None:
+    """Matplotlib leaves corners of shorter ones unset, and may take infinite limits of them."""
+    art3d = pytest.importorskip("mpl_toolkits.mplot3d.art3d")
+    drawn = []
+
+    class Kept(art3d.Poly3DCollection):
+        def __init__(self, faces, **options):
+            drawn.append(faces)
+            super().__init__(faces, **options)
+
+    monkeypatch.setattr(art3d, "Poly3DCollection", Kept)
+    can = Cylinder(np.array([0.03, 0, 0.1]), np.array([0, 1, 0.2]), 0.015)
+    figure_of_solution(synthetic.solution(0.3, of=synthetic.finger(obstacles=(can,))))
+    (faces,) = drawn
+    assert len({len(face) for face in faces}) == 1
