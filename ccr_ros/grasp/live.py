@@ -11,6 +11,7 @@ import numpy as np
 
 from ccr_ros.grasp.statics import Body, DiskShape, GraspSolution, GraspSolver
 from ccr_ros.grasp.statics.solver import Pulls
+from ccr_ros.model.errors import InvalidValue
 from ccr_ros.model.files import MountedFinger
 from ccr_ros.model.rotation import Pose
 from ccr_ros.model.settings import SolverSettings
@@ -191,7 +192,10 @@ class LiveGrasp:
         body, fingers, most = self._solver.body, self._arguments[0], 0.0
         for mounted, alone in zip(fingers, self._alone, strict=True):
             here = body.shape.moved(mounted.base.inverse() @ body.pose)
-            alone.obstacles = (*mounted.finger.obstacles, here)
+            try:
+                alone.obstacles = (*mounted.finger.obstacles, here)
+            except InvalidValue:  # it lies on the finger's base, which no finger takes for a grip
+                return math.inf
             name = mounted.finger.name
             found = alone.solve(pulls.get(name, self._solver.pulls[name]))
             if not found.certificate.converged:

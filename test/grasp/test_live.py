@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """An object between running fingers: what is said of it, and what becomes of it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -252,3 +254,11 @@ def test_disks_press_on_each_other_where_they_shall(fingers):
     assert len(pull(live, 0.047 * 0.182).disk_contacts) == 3
     copy = live.copy(1.0)
     assert copy.disks == disks and len(copy.solve({}).disk_contacts) == 3
+
+
+def test_what_fell_onto_a_finger_s_base_is_no_grip_to_be_measured(hanging, fingers):
+    base = fingers[0].base.position
+    hanging._solver.body = replace(hanging.body, pose=Pose(base))
+    hanging.want(PLACE, TOO_HEAVY, True)
+    pull(hanging, SHUT)
+    assert hanging.failure.startswith("dropped: ") and not hanging.lost
