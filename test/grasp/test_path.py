@@ -7,6 +7,8 @@ from friction_cases import LONG, around, cube, pinch, three_on_a_ball
 
 from ccr_ros.grasp.live import LiveGrasp
 from ccr_ros.grasp.statics import GraspSolver, sphere_body
+from ccr_ros.grasp.statics.path import Way
+from ccr_ros.grasp.statics.result import make_grasp_solution
 from ccr_ros.model import Pose, load_gripper
 from ccr_ros.resources import find_config
 
@@ -125,3 +127,11 @@ def test_points_that_slip_beside_others_do_not_jam_the_search(case):
     for contact in found.contacts:
         along = float(np.linalg.norm(contact.friction_force))
         assert along <= friction * contact.force * (1 + 1e-6) + 1e-12
+
+
+def test_what_ends_just_before_its_target_has_not_come_to_all_of_it():
+    solver = pinch(0.5)
+    solver.let_go().require_converged()
+    way = Way(solver.point, list(solver.pulls.values()), reached=0.9999)
+    told = make_grasp_solution(solver.hand, solver.body, way, way.pulls, False, 0.0)
+    assert not told.converged and "beyond 99.9% of the way" in told.message

@@ -300,7 +300,9 @@ def _disk_contacts(
 
 def _message(way: Way, falls: str, room: DiskRoom | None) -> str:
     if way.reached is not None:
-        where = f"beyond {way.reached:.1%} of the way to the wanted pulls and loads"
+        # Rounded down: what ends just before its target has not come to 100 %.
+        share = math.floor(1e3 * way.reached) / 10
+        where = f"beyond {share:.1f}% of the way to the wanted pulls and loads"
         if room is not None and way.through is not None:
             disks = room.in_words(way.through)
             return f"{disks} would go through each other {where}"
