@@ -32,8 +32,6 @@ from ccr_ros.grasp.statics import DiskShape, GraspSolver
 from ccr_ros.model import InvalidValue, SolverSettings, UnknownName, load_gripper
 from ccr_ros.resources import find_config
 
-# Share of a finger's length; see docs/grasp_statics.md: at the solver's own a ball may be 2 mm off.
-_FRICTION_STEP = 0.001
 _TIME_LIMIT = 60.0  # s per solve; a person at a prompt waits longer than a control loop
 
 
@@ -71,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
     gravity = gravity_from_args(args)
     disks = None if args.disks is None else DiskShape(rim=number("--disks", args.disks, 0, 1))
     settings = SolverSettings(time_limit=_TIME_LIMIT)
-    solver = GraspSolver(gripper.fingers, body, settings, gravity, _FRICTION_STEP, disks)
+    solver = GraspSolver(gripper.fingers, body, settings, gravity, disks=disks)
     solution = solver.solve(parse_grip(args.pull, solver))
     if solution.converged:
         solution = solver.let_go()

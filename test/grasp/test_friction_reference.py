@@ -43,7 +43,7 @@ def followed(settings, friction_step):
             2.5e-5,
             0.02,
         ),
-        (SolverSettings(time_limit=60.0), 2.5e-3, 1e-2, 4e-5, 0.045),
+        (SolverSettings(time_limit=60.0), 1.25e-3, 1e-2, 4e-5, 0.045),
     ],
 )
 def test_a_ball_is_carried_as_the_reference_says(settings, friction_step, force, way, share):
