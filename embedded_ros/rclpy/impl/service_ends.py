@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import secrets
 import struct
+from abc import ABC, abstractmethod
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -69,7 +70,7 @@ def unpack(payload: bytes) -> tuple[rmw_request_id_t, bytes]:
     return rmw_request_id_t(guid, number), payload[:4] + payload[20:]
 
 
-class ServiceEnd(QueuedEntity):
+class ServiceEnd(QueuedEntity, ABC):
     """A writer and a reader that belong together. `role` is ``client`` or ``service``."""
 
     def __init__(
@@ -112,9 +113,9 @@ class ServiceEnd(QueuedEntity):
     def _peer_ids(self, peers: dict[int, bytes], key: str) -> set[str]:
         return {value for data in peers.values() if (value := user_data_value(data, key))}
 
+    @abstractmethod
     def look_after(self) -> None:
         """See to what waits for others; executors call this every now and then."""
-        raise NotImplementedError
 
     def drain(self) -> None:
         """Fetch what has arrived."""
